@@ -277,8 +277,9 @@ class PairSearch {
         ofA_.take(a_, a);
         ofB_.take(b_, b);
         const LeafTriangles &ofA = ofA_, &ofB = ofB_;
-        const auto along = [&](const TriangleCorners& c) {
-            return std::array{glm::dot(direction_, c[0]), glm::dot(direction_, c[1]), glm::dot(direction_, c[2])};
+        // measuring changes the direction: the bounds of this pair need one and the same
+        const auto along = [direction = direction_](const TriangleCorners& c) {
+            return std::array{glm::dot(direction, c[0]), glm::dot(direction, c[1]), glm::dot(direction, c[2])};
         };
         std::array<double, treeWidth> farthest{};
         for (std::size_t k = 0; k < ofB.count; ++k) {

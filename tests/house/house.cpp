@@ -147,6 +147,16 @@ TEST_CASE("the code has no leftovers and no paths of somebody's machine") {
     CHECK(wrong == "");
 }
 
+TEST_CASE("no source file is long") {
+    constexpr std::ptrdiff_t maxLines = 400;
+    for (const char* folder : {"sdf", "collider", "cl", "integration", "tools", "demos", "bench", "tests"})
+        for (const std::string& file : codeIn(folder)) {
+            const std::string text = contents(file);
+            CAPTURE(file);
+            CHECK(std::count(text.begin(), text.end(), '\n') <= maxLines);
+        }
+}
+
 TEST_CASE("code compiled for several instruction sets is in anonymous namespaces") {
     // two classes of one name in one namespace are one class to the linker
     int found = 0;
