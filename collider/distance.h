@@ -11,13 +11,13 @@
 namespace bilayer {
 
 struct DistanceOptions {
-    /// The search ends early for bodies that are farther apart than this [m]. Zero finds only overlaps and touches.
+    /// The search ends early if the separation exceeds this [m]. Zero finds only bodies that overlap or touch.
     float maxDistance = std::numeric_limits<float>::infinity();
 };
 
 /// How two solids lie relative to each other.
 enum class Overlap {
-    none,      ///< they are apart, or touch
+    none,      ///< they are separated, or touch
     surfaces,  ///< their surfaces intersect
     aInsideB,  ///< A, or a component of it, lies inside B, and the surfaces do not meet
     bInsideA,  ///< the same with B inside A
@@ -33,7 +33,7 @@ struct WitnessPoint {
 
 /// The answer of distance().
 struct BodyDistance {
-    bool found = false;  ///< false: farther apart than the limit; the other members are invalid
+    bool found = false;  ///< false: the separation exceeds the limit; the other members are invalid
     Overlap overlap = Overlap::none;
     /// Separation of the solids, or minus the penetration depth of the deepest contact [m].
     float distance = std::numeric_limits<float>::infinity();
@@ -52,7 +52,7 @@ struct DistanceStart {
 ///
 /// - Separated bodies: the distance is exact to 1e-6 of the size of the larger body.
 /// - Surfaces that intersect: the penetration depth of the surface point of one body that is deepest in the other, and
-///   the normal there. Moving the bodies apart may take a longer way.
+///   the normal there. A larger displacement may be needed to separate the bodies.
 /// - One body inside the other: the same for the deepest surface point of the inner body.
 ///
 /// Safe from any thread, allocates nothing. The first call for a body takes some time to prepare it.
