@@ -72,7 +72,6 @@ constexpr float rounding = 2e-6f;
 /// Direction components below this are replaced by it, so that division is possible.
 constexpr float minDirection = 1e-20f;
 
-
 // A ray's search for its nearest exit.
 class ExitSearch {
   public:
