@@ -1,14 +1,10 @@
 // A library of small meshes: `bilayer batch` on one core and on several, compared with a loop of single builds and with
 // GNU parallel.
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -17,15 +13,13 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include <bilayer/sdf/mesh_io.h>
+#include "bench/command.h"
 #include "bench/measure.h"
 #include "bench/program.h"
 #include "demos/shared/shapes.h"
-
-extern char** environ;
 
 using namespace bilayer;
 using namespace bilayer::bench;
@@ -44,33 +38,16 @@ using Words = std::vector<std::string>;
 // What one way to convert the library took.
 struct Conversion {
     std::string name;
-    std::vector<double> seconds;   // one entry a round
-    std::vector<double> overhead;  // of a mesh, beside reading, building and writing [s]; for the batch on one core
+    std::vector<double> seconds;  // one entry a round
+    std::vector<double>
+        overhead;  // of a mesh, in addition to reading, building and writing [s]; for the batch on one core
 };
 
-// Runs a command until it exits with status 0, and returns its time. Standard error goes to a file.
+// The seconds that a command takes; throws with its first line of errors if it fails.
 double timed(const Words& words, const fs::path& scratch) {
-    std::vector<char*> arguments;
-    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
-    arguments.push_back(nullptr);
-    const fs::path errors = scratch / "errors.txt";
-    posix_spawn_file_actions_t files;
-    posix_spawn_file_actions_init(&files);
-    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    posix_spawn_file_actions_addopen(&files, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    const Stopwatch watch;
-    pid_t process = 0;
-    const int error = ::posix_spawnp(&process, arguments[0], &files, nullptr, arguments.data(), environ);
-    posix_spawn_file_actions_destroy(&files);
-    if (error) throw std::system_error(error, std::generic_category(), words[0]);
-    int status = 0;
-    while (::waitpid(process, &status, 0) < 0)
-        if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "waitpid");
-    const double seconds = watch.seconds();
-    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return seconds;
-    std::string line;
-    std::getline(std::ifstream(errors) >> std::ws, line);
-    throw std::runtime_error(fmt::format("{} failed: {}", words[0], line));
+    const CommandResult run = runCommand(words, scratch);
+    if (run.succeeded) return run.seconds;
+    throw std::runtime_error(fmt::format("{} failed: {}", words[0], run.errors.substr(0, run.errors.find('\n'))));
 }
 
 // Closed bodies of 200 to 20,000 triangles.
@@ -136,7 +113,7 @@ class BatchBench {
             fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", c.name, seconds, *low, *high,
                        1e3 * seconds / options_.meshes, one / seconds);
         }
-        fmt::print("\nOverhead of a mesh beside reading, building and writing, batch on 1 core: {:.2f} ms\n",
+        fmt::print("\nOverhead of a mesh in addition to reading, building and writing, batch on 1 core: {:.2f} ms\n",
                    1e3 * median(conversions_.front().overhead));
     }
 

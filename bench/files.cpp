@@ -1,11 +1,8 @@
 // From mesh file to field file: compares whole commands in cold processes with the same by OpenVDB, and reading alone
 // with Assimp.
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/tools/MeshToVolume.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
@@ -15,7 +12,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -23,16 +19,14 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include <bilayer/sdf/mesh_io.h>
 #include "bench/builders.h"
+#include "bench/command.h"
 #include "bench/measure.h"
 #include "bench/program.h"
 #include "sdf/base/openvdb.h"
-
-extern char** environ;
 
 using namespace bilayer;
 using namespace bilayer::bench;
@@ -51,40 +45,6 @@ struct Options {
 };
 
 using Words = std::vector<std::string>;
-
-/// Cost of a command.
-struct Run {
-    double seconds = 0;
-    std::string out;
-    bool done = false;  // exited with status 0
-};
-
-std::string slurp(const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
-/// Runs a command until it exits.
-Run timed(const Words& words, const fs::path& scratch) {
-    std::vector<char*> arguments;
-    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
-    arguments.push_back(nullptr);
-    const fs::path out = scratch / "out.txt";
-    posix_spawn_file_actions_t files;
-    posix_spawn_file_actions_init(&files);
-    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-    const Stopwatch watch;
-    pid_t process = 0;
-    const int error = ::posix_spawnp(&process, arguments[0], &files, nullptr, arguments.data(), environ);
-    posix_spawn_file_actions_destroy(&files);
-    if (error) throw std::system_error(error, std::generic_category(), words[0]);
-    int status = 0;
-    while (::waitpid(process, &status, 0) < 0)
-        if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "waitpid");
-    const double seconds = watch.seconds();
-    return {seconds, slurp(out), WIFEXITED(status) && WEXITSTATUS(status) == 0};
-}
 
 // Writes text PLY, which the project itself does not.
 void writeText(const fs::path& path, const Mesh& mesh) {
@@ -183,12 +143,12 @@ Contest contest(const Options& options, const fs::path& mesh, const fs::path& sc
         for (const auto& [name, words] : ways) {
             std::error_code ignored;
             fs::remove(out, ignored);
-            const Run run = timed(words, scratch);
-            if (!run.done) continue;
+            const CommandResult run = runCommand(words, scratch);
+            if (!run.succeeded) continue;
             const bool isRead = name.starts_with("read");
-            result.seconds[name].push_back(isRead ? std::stod(run.out) : run.seconds);
+            result.seconds[name].push_back(isRead ? std::stod(run.output) : run.seconds);
             if (name != "bilayer") continue;
-            const auto json = nlohmann::json::parse(run.out);
+            const auto json = nlohmann::json::parse(run.output);
             double rest = run.seconds;
             for (const char* part : {"read", "build", "inspect", "write"}) {
                 result.parts[part].push_back(json["seconds"][part]);

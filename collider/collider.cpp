@@ -138,11 +138,7 @@ const MeshTree& ColliderData::meshTree() const {
 std::span<const glm::vec3> ColliderData::componentPoints() const {
     once(componentsOnce_, [&] {
         const Mesh welded = weld(mesh());
-        ConcurrentDisjointSets sets(welded.points.size());
-        for (const glm::uvec3& t : welded.triangles) {
-            sets.join(t.x, t.y);
-            sets.join(t.x, t.z);
-        }
+        ConcurrentDisjointSets sets = connectedVertices(welded);
         for (unsigned i = 0; i < welded.points.size(); ++i)
             if (sets.root(i) == i) componentPoints_.push_back(welded.points[i]);
     });

@@ -21,61 +21,64 @@ constexpr double minDirection = 1e-7;
 constexpr int refinements = 40;
 constexpr float maxLead = 1024, minLead = 0.01f;
 
-Similarity mapInto(const Placed& into, const Placed& from) {
-    const glm::dquat toInto = glm::conjugate(glm::normalize(glm::dquat(into.pose.rotation)));
-    const glm::dquat rotation = toInto * glm::normalize(glm::dquat(from.pose.rotation));
-    const double scale = 1 / double(into.scale);
-    return {glm::mat3_cast(rotation), double(from.scale) * scale,
-            scale * (toInto * (glm::dvec3(from.pose.position) - glm::dvec3(into.pose.position)))};
+/// Maps coordinates of the body to the world.
+Similarity toWorld(const Placed& body) {
+    return {glm::mat3_cast(glm::normalize(glm::dquat(body.pose.rotation))), double(body.scale),
+            glm::dvec3(body.pose.position)};
 }
 
-glm::dvec3 toWorld(const Placed& body, const glm::dvec3& point) {
-    return glm::normalize(glm::dquat(body.pose.rotation)) * (double(body.scale) * point) +
-           glm::dvec3(body.pose.position);
-}
+/// Two bodies, and the map from coordinates of the first to those of the second.
+struct Bodies {
+    const Placed &a, &b;
+    Similarity aToB;
+
+    Bodies swapped() const { return {b, a, aToB.inverted()}; }
+};
 
 double sizeOf(const Placed& body) {
     return double(body.scale) * double(body.collider.bounds().longestSide());
 }
 
-WitnessPoint witness(const Placed& frame, const TrianglePoint& point, std::uint32_t triangle) {
-    return {toWorld(frame, point.position), triangle, point.feature, point.index};
+WitnessPoint witness(const Similarity& toWorld, const TrianglePoint& point, std::uint32_t triangle) {
+    return {toWorld(point.position), triangle, point.feature, point.index};
 }
 
-BodyDistance separated(const Placed& a, const Placed& b, const MeshDistance& found) {
+BodyDistance separated(const Bodies& bodies, const MeshDistance& found) {
+    const Similarity bToWorld = toWorld(bodies.b);
+    const double distance = found.distance * bToWorld.scale;
     BodyDistance answer{.found = true,
-                        .distance = float(found.distance * double(b.scale)),
-                        .a = witness(b, found.a, found.triangleA),
-                        .b = witness(b, found.b, found.triangleB)};
-    if (found.distance * double(b.scale) > minDirection * std::max(sizeOf(a), sizeOf(b)))
-        answer.normal =
-            glm::normalize(glm::dquat(b.pose.rotation)) * glm::normalize(found.a.position - found.b.position);
+                        .distance = float(distance),
+                        .a = witness(bToWorld, found.a, found.triangleA),
+                        .b = witness(bToWorld, found.b, found.triangleB)};
+    if (distance > minDirection * std::max(sizeOf(bodies.a), sizeOf(bodies.b)))
+        answer.normal = bToWorld.rotation * glm::normalize(found.a.position - found.b.position);
     return answer;
 }
 
-// Whether a component of a body lies inside another, if their surfaces do not meet.
-bool isInside(const Placed& inner, const Placed& outer) {
-    const Similarity map = mapInto(outer, inner);
-    const Bounds& bounds = outer.collider.bounds();
-    const auto components = inner.collider.data().componentPoints();
+// Whether a component of the first body lies inside the second, if their surfaces do not meet.
+bool isInside(const Bodies& bodies) {
+    const Collider& outer = bodies.b.collider;
+    const Bounds& bounds = outer.bounds();
+    const auto components = bodies.a.collider.data().componentPoints();
     return std::any_of(components.begin(), components.end(), [&](const glm::vec3& point) {
-        const glm::vec3 at(map(glm::dvec3(point)));
-        return at == glm::clamp(at, bounds.lower, bounds.upper) && outer.collider.exactField().inside(at);
+        const glm::vec3 at(bodies.aToB(glm::dvec3(point)));
+        return at == glm::clamp(at, bounds.lower, bounds.upper) && outer.exactField().inside(at);
     });
 }
 
-// A point of one body's surface inside another body, and the closest point of that body's surface; both in coordinates
-// of the other body.
+// A point of the first body's surface inside the second, and the closest point of the second's surface; both in
+// coordinates of the second.
 struct Depth {
     glm::vec3 point{0};
     ClosestPoint closest{.distance = 0};
 };
 
 // The deepest of the surface points.
-Depth deepestSample(const Placed& inner, const Field& field, const Similarity& map) {
+Depth deepestSample(const Bodies& bodies) {
+    const Field& field = bodies.b.collider.exactField();
     Depth deepest;
-    for (const SurfacePoint& point : inner.collider.data().points().points()) {
-        const glm::vec3 at(map(glm::dvec3(point.position)));
+    for (const SurfacePoint& point : bodies.a.collider.data().points().points()) {
+        const glm::vec3 at(bodies.aToB(glm::dvec3(point.position)));
         const Sample sample = field.sample(at);
         const bool shallow = sample.inBand && sample.distance > deepest.closest.distance + field.voxelSize();
         if (!(sample.distance < 0) || shallow) continue;
@@ -85,17 +88,17 @@ Depth deepestSample(const Placed& inner, const Field& field, const Similarity& m
     return deepest;
 }
 
-// Moves the point along the inner surface as far as it gets deeper: to where the surface is closest to a point that
+// Moves the point along the first surface as far as it gets deeper: to where the surface is closest to a point that
 // lies ahead in the direction of penetration. The lead is halved when that leads elsewhere.
-Depth refined(Depth depth, const Placed& inner, const Field& field, const Similarity& map) {
-    const Field& own = inner.collider.exactField();
+Depth refined(Depth depth, const Bodies& bodies) {
+    const Field &own = bodies.a.collider.exactField(), &field = bodies.b.collider.exactField();
     const float voxel = field.voxelSize();
     float lead = field.voxelSize() * maxLead;
     for (int i = 0; i < refinements && lead > minLead * voxel; ++i) {
         const glm::vec3 ahead = depth.point - lead * depth.closest.normal;
-        const ClosestPoint onSurface = own.closest(glm::vec3(map.inverse(glm::dvec3(ahead))));
+        const ClosestPoint onSurface = own.closest(glm::vec3(bodies.aToB.inverse(glm::dvec3(ahead))));
         if (!onSurface.found) return depth;
-        const glm::vec3 at(map(glm::dvec3(onSurface.position)));
+        const glm::vec3 at(bodies.aToB(glm::dvec3(onSurface.position)));
         const ClosestPoint closest = field.closest(at);
         if (closest.found && closest.distance < depth.closest.distance)
             depth = {at, closest};
@@ -105,19 +108,18 @@ Depth refined(Depth depth, const Placed& inner, const Field& field, const Simila
     return depth;
 }
 
-// The deepest surface point of one body inside another; at depth 0 if there is none.
-BodyDistance deepestOf(const Placed& inner, const Placed& outer) {
-    const Similarity map = mapInto(outer, inner);
-    const Field& field = outer.collider.exactField();
-    Depth depth = deepestSample(inner, field, map);
-    if (depth.closest.distance < 0) depth = refined(depth, inner, field, map);
+// The deepest surface point of the first body inside the second; at depth 0 if there is none.
+BodyDistance deepestOf(const Bodies& bodies) {
+    Depth depth = deepestSample(bodies);
+    if (depth.closest.distance < 0) depth = refined(depth, bodies);
     const ClosestPoint& closest = depth.closest;
+    const Similarity bToWorld = toWorld(bodies.b);
     return {.found = true,
             .overlap = Overlap::surfaces,
-            .distance = closest.distance * outer.scale,
-            .a = {toWorld(outer, glm::dvec3(depth.point))},
-            .b = {toWorld(outer, glm::dvec3(closest.position)), closest.triangle, closest.feature, closest.index},
-            .normal = outer.pose.rotation * closest.normal};
+            .distance = closest.distance * bodies.b.scale,
+            .a = {bToWorld(glm::dvec3(depth.point))},
+            .b = {bToWorld(glm::dvec3(closest.position)), closest.triangle, closest.feature, closest.index},
+            .normal = bodies.b.pose.rotation * closest.normal};
 }
 
 BodyDistance swapped(BodyDistance answer) {
@@ -126,14 +128,15 @@ BodyDistance swapped(BodyDistance answer) {
     return answer;
 }
 
-BodyDistance intersecting(const Placed& a, const Placed& b, const MeshDistance& touch) {
-    const BodyDistance ofA = deepestOf(a, b), ofB = deepestOf(b, a);
+BodyDistance intersecting(const Bodies& bodies, const MeshDistance& touch) {
+    const BodyDistance ofA = deepestOf(bodies), ofB = deepestOf(bodies.swapped());
     if (ofA.distance < 0 || ofB.distance < 0) return ofA.distance <= ofB.distance ? ofA : swapped(ofB);
+    const Similarity bToWorld = toWorld(bodies.b);
     return {.found = true,
             .overlap = Overlap::surfaces,
             .distance = 0,
-            .a = witness(b, touch.a, touch.triangleA),
-            .b = witness(b, touch.b, touch.triangleB)};
+            .a = witness(bToWorld, touch.a, touch.triangleA),
+            .b = witness(bToWorld, touch.b, touch.triangleB)};
 }
 
 BodyDistance contained(BodyDistance deepest, Overlap overlap) {
@@ -144,16 +147,16 @@ BodyDistance contained(BodyDistance deepest, Overlap overlap) {
 }  // namespace
 
 BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& options, DistanceStart* start) {
-    const Similarity aToB = mapInto(b, a);
+    const Bodies bodies{a, b, toWorld(a).into(toWorld(b))};
     const double limit = std::max(double(options.maxDistance), 0.0) / double(b.scale);
     const MeshDistance found =
-        distanceBetween(a.collider.data().meshTree(), b.collider.data().meshTree(), aToB, limit,
+        distanceBetween(a.collider.data().meshTree(), b.collider.data().meshTree(), bodies.aToB, limit,
                         start ? TriangleIndices{start->triangleA, start->triangleB} : TriangleIndices{});
     if (start) *start = {found.triangleA, found.triangleB};
-    if (found.found() && found.distance == 0) return intersecting(a, b, found);
-    if (isInside(a, b)) return contained(deepestOf(a, b), Overlap::aInsideB);
-    if (isInside(b, a)) return contained(swapped(deepestOf(b, a)), Overlap::bInsideA);
-    return found.found() ? separated(a, b, found) : BodyDistance{};
+    if (found.found() && found.distance == 0) return intersecting(bodies, found);
+    if (isInside(bodies)) return contained(deepestOf(bodies), Overlap::aInsideB);
+    if (isInside(bodies.swapped())) return contained(swapped(deepestOf(bodies.swapped())), Overlap::bInsideA);
+    return found.found() ? separated(bodies, found) : BodyDistance{};
 }
 
 }  // namespace bilayer

@@ -133,11 +133,7 @@ std::size_t countDuplicates(const Topology& topology) {
 
 // Finds the components connected by shared vertices, and returns the component index of each triangle.
 std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
-    ConcurrentDisjointSets sets(mesh.points.size());
-    forAll(mesh.triangles.size(), [&](std::size_t i) {
-        sets.join(mesh.triangles[i].x, mesh.triangles[i].y);
-        sets.join(mesh.triangles[i].x, mesh.triangles[i].z);
-    });
+    ConcurrentDisjointSets sets = connectedVertices(mesh);
     std::vector<unsigned> number(mesh.points.size(), noPart), of(mesh.triangles.size());
     forAll(of.size(), [&](std::size_t i) { of[i] = sets.root(mesh.triangles[i].x); });
     count = 0;

@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/base/finite.h"
 #include "sdf/base/large_array.h"
 #include "sdf/base/parallel_parts.h"
 #include "sdf/base/welding.h"
@@ -30,10 +31,6 @@ namespace {
 
 /// Vertices or triangles per task.
 constexpr std::size_t grain = 1 << 14;
-
-bool finite(const glm::vec3& p) {
-    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
-}
 
 // Calls body(run, begin, end) for runs of the indices below n, in parallel.
 template <class Body>
@@ -167,7 +164,7 @@ void validate(const Mesh& mesh) {
     if (points >= std::numeric_limits<unsigned>::max() || triangles >= std::size_t(std::numeric_limits<int>::max()))
         throw std::invalid_argument(
             fmt::format("the mesh is too large: {} vertices, {} triangles; at most 2^31 - 2", points, triangles));
-    const std::size_t p = firstWhere(points, [&](std::size_t i) { return !finite(mesh.points[i]); });
+    const std::size_t p = firstWhere(points, [&](std::size_t i) { return !isFinite(mesh.points[i]); });
     if (p < points)
         throw std::invalid_argument(fmt::format("vertex {} is not finite: ({}, {}, {})", p, mesh.points[p].x,
                                                 mesh.points[p].y, mesh.points[p].z));

@@ -46,7 +46,7 @@ json measureTable5(const Run& run) {
         json row{{"variance", variance(scene.mesh)},
                  {"triangles", scene.mesh.triangles.size()},
                  {"samples", field.samples},
-                 {"mostSamples", field.maxSamples}};
+                 {"maxSamples", field.maxSamples}};
         row["seconds"] =
             medians({builder("layers", scene, {Builder::doubleLayer, halfWidth, threads}),
                      builder("exact", scene, {Builder::exact, halfWidth, threads}), dense("dense", scene, lattice)},
@@ -79,7 +79,7 @@ std::string textTable5(const json& data) {
         for (const double time : times.back())
             cells.push_back(cells.size() == 1 ? printed(paper.seconds) : seconds(time));
         cells.push_back(
-            fmt::format("{} / {}", row["samples"].get<std::uint64_t>(), row["mostSamples"].get<std::uint64_t>()));
+            fmt::format("{} / {}", row["samples"].get<std::uint64_t>(), row["maxSamples"].get<std::uint64_t>()));
         rows.push_back(cells);
     }
     std::vector<std::string> last{"last over first"};

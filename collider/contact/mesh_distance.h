@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
 
@@ -20,6 +21,11 @@ struct Similarity {
 
     glm::dvec3 operator()(const glm::dvec3& point) const { return scale * (rotation * point) + shift; }
     glm::dvec3 inverse(const glm::dvec3& point) const { return (point - shift) * rotation / scale; }
+    Similarity inverted() const { return {glm::transpose(rotation), 1 / scale, inverse({0, 0, 0})}; }
+    /// The inverse of `to` after this.
+    Similarity into(const Similarity& to) const {
+        return {glm::transpose(to.rotation) * rotation, scale / to.scale, to.inverse(shift)};
+    }
 };
 
 /// The closest points of two meshes, in coordinates of the second.

@@ -2,15 +2,13 @@
 // Tested by tests/collider/distance.cpp.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 
 #include <bilayer/collider/query.h>
+#include "sdf/base/triangle_corners.h"
 
 namespace bilayer::detail {
-
-using TriangleCorners = std::array<glm::dvec3, 3>;
 
 /// A point of a triangle, and the feature that it lies on.
 struct TrianglePoint {

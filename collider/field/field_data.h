@@ -16,12 +16,9 @@
 #include <bilayer/collider/query.h>
 #include "collider/field/field_layout.h"
 #include "collider/field/mesh_tree.h"
+#include "sdf/base/finite.h"
 
 namespace bilayer::detail {
-
-inline bool isFinite(const glm::vec3& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 /// A length as a float; never infinite, as points and directions are not.
 inline float toFloat(double length) {

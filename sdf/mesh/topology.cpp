@@ -114,6 +114,16 @@ ConcurrentDisjointSets::ConcurrentDisjointSets(std::size_t n) : parent_(n) {
     forAllPolled(n, grain, nullptr, [&](std::size_t i) { parent_[i] = unsigned(i); });
 }
 
+ConcurrentDisjointSets connectedVertices(const Mesh& mesh) {
+    ConcurrentDisjointSets sets(mesh.points.size());
+    forAllPolled(mesh.triangles.size(), grain, nullptr, [&](std::size_t i) {
+        const glm::uvec3& t = mesh.triangles[i];
+        sets.join(t.x, t.y);
+        sets.join(t.x, t.z);
+    });
+    return sets;
+}
+
 std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress) {
     auto hashes = vectorOf<std::uint64_t>(mesh.points.size(), progress);
     forAllPolled(hashes.size(), grain, progress, [&](std::size_t i) { hashes[i] = hashOf(mesh.points[i]); });

@@ -173,4 +173,7 @@ class ConcurrentDisjointSets {
     LargeArray<unsigned> parent_;
 };
 
+/// The connected components of a mesh, as sets of its vertices. Vertices are connected by triangles that share indices.
+ConcurrentDisjointSets connectedVertices(const Mesh& mesh);
+
 }  // namespace bilayer::detail

@@ -196,3 +196,17 @@ TEST_CASE("docs/api.md lists each public header once, and no page names a missin
         }
     }
 }
+
+TEST_CASE("a test that is a command has its programs built before it runs") {
+    // bilayer_command_test() makes the programs that a command names part of what ./run test builds; add_test() does
+    // not
+    std::string wrong;
+    int found = 0;
+    eachLine([&](const std::string& file, int, const std::string& line) {
+        if (fs::path(file).filename() != "CMakeLists.txt") return;
+        found += line.find("bilayer_command_test(") != std::string::npos;
+        if (line.find("add_test(") != std::string::npos && file != "tests/CMakeLists.txt") wrong += file + "\n";
+    });
+    CHECK(wrong == "");
+    CHECK(found >= 6);
+}
