@@ -24,6 +24,8 @@ namespace {
 constexpr float restTolerance = 3e-3f;
 // Contacts are chosen again when the bodies have moved relative to each other by this fraction of the tolerance.
 constexpr float slackTolerances = 0.5f;
+// They are chosen again, too, when another contact is deeper by this fraction of the slack.
+constexpr float pressSlack = pressTolerance / (slackTolerances * reductionTolerance);
 
 bool isStill(const std::vector<Contact>& contacts, std::span<const Patch> last) {
     if (contacts.empty() || last.empty()) return false;
@@ -106,7 +108,7 @@ bool ContactReduction::reuse(const std::vector<Contact>& contacts) {
         if (!contact) return false;
         deepestFound = std::min(deepestFound, contact->distance);
     }
-    if (deepest < deepestFound - 0.5f * reduced_.slack) return false;
+    if (deepest < deepestFound - pressSlack * reduced_.slack) return false;
     auto next = found.begin();
     for (Patch& patch : reduced_.patches)
         for (int i = 0; i < patch.count; ++i) patch.contacts[i] = **next++;

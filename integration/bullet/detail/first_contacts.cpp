@@ -18,8 +18,7 @@ using namespace bilayer::detail;
 
 namespace {
 
-// The tolerance is smaller for a mere press, since the deepest penetration pushes bodies apart, and for shifts and
-// twists, which change separations as little as the smallest tilts.
+// The tolerance is smaller for shifts and twists, which change separations as little as the smallest tilts.
 constexpr float toleranceUntilted = reductionTolerance / 4;
 // A contact of the last step stays while some motion meets it first to within this many tolerances. Contacts that bear
 // a load must not come and go, or a stack never comes to rest.
@@ -213,8 +212,13 @@ class FirstContactSearch {
   private:
     using Motions = std::uint64_t;  ///< one bit each
 
-    float toleranceOf(const Perturbation& perturbation) const {
-        return (perturbation.tilt == glm::vec2(0) ? toleranceUntilted : reductionTolerance) * separations_.extent();
+    /// The last motion, which is a mere press, while no body approaches another.
+    bool isPressAtRest(std::size_t n) const { return n + 1 == perturbations_.size() && separations_.rotation() == 0; }
+
+    float toleranceOf(std::size_t n) const {
+        const bool tilts = perturbations_[n].tilt != glm::vec2(0);
+        const float tolerance = tilts ? reductionTolerance : isPressAtRest(n) ? pressTolerance : toleranceUntilted;
+        return tolerance * separations_.extent();
     }
 
     /// The motions that meet a contact first, to within so many tolerances.
@@ -222,7 +226,7 @@ class FirstContactSearch {
         Motions met = 0;
         for (std::size_t n = 0; n < perturbations_.size(); ++n) {
             if (separations_.of(k, perturbations_[n]) <=
-                minSeparations_[n] + tolerances * toleranceOf(perturbations_[n]))
+                minSeparations_[n] + tolerances * toleranceOf(n))
                 met |= Motions(1) << n;
         }
         return met;
@@ -242,8 +246,9 @@ class FirstContactSearch {
 
     /// Whether a kept contact touches not much later than the first one in a motion.
     bool isNearlyMet(std::size_t n) const {
+        if (isPressAtRest(n)) return false;
         return separations_.minOf(kept_, perturbations_[n]) <=
-               minSeparations_[n] + hysteresis * toleranceOf(perturbations_[n]);
+               minSeparations_[n] + hysteresis * toleranceOf(n);
     }
 
     /// Whether every motion that meets this contact first is covered by another kept contact.
@@ -255,14 +260,19 @@ class FirstContactSearch {
                minSeparations_.back() + hysteresis * reductionTolerance * separations_.extent();
     }
 
-    /// The redundant contact that is farthest away, or else the last contact.
+    /// The redundant contact that is farthest away, or else the last one; but none that bears a body at rest.
     std::size_t leastNeeded() const {
         std::size_t which = kept_.size();
         for (std::size_t i = 0; i < kept_.size(); ++i)
             if (isSpare(i) &&
                 (which == kept_.size() || separations_.of(kept_[i], {}) > separations_.of(kept_[which], {})))
                 which = i;
-        return std::min(which, kept_.size() - 1);
+        if (which < kept_.size()) return which;
+        const std::size_t press = perturbations_.size() - 1;
+        const Motions bearing = isPressAtRest(press) ? Motions(1) << press : 0;
+        for (which = kept_.size() - 1; which > 0 && met_[which] & bearing; --which) {
+        }
+        return which;
     }
 
     void leaveOut(std::size_t i) {
