@@ -17,6 +17,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "collider/contact/triangle_distance_lanes.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -58,10 +60,11 @@ glm::dmat3 orthonormal(const glm::dmat3& m) {
     return {x, y, glm::dot(z, m[2]) < 0 ? -z : z};
 }
 
-// A mesh with its hierarchy in the common frame.
+// A mesh with its hierarchy in the common frame. For use by one thread: keeps the frames of groups that are used again.
 class PosedTree {
   public:
     PosedTree(const MeshTree& mesh, const Similarity& map) : mesh_(mesh), map_(map) {
+        ofFrame_.fill(nullptr);
         unit_ = map.scale * double(mesh.voxelSize());
         origin_ = map(glm::dvec3(mesh.tree().base) * double(mesh.voxelSize()));
         linear_ = map.scale * map.rotation;
@@ -71,21 +74,21 @@ class PosedTree {
     const OrientedGroup& group(std::uint32_t node) const { return mesh_.group(node); }
     std::size_t triangleCount() const { return mesh_.mesh().triangles.size(); }
 
-    GroupFrame frameOf(const OrientedGroup& group) const {
-        glm::dmat3 stored;
-        for (int k = 0; k < 3; ++k) stored[k] = glm::dvec3(group.axes[k][0], group.axes[k][1], group.axes[k][2]);
-        const glm::dmat3 axes = orthonormal(stored), off = axes - stored;
-        const double skew = std::max({glm::length(off[0]), glm::length(off[1]), glm::length(off[2])});
-        const glm::dvec3 origin(group.origin[0], group.origin[1], group.origin[2]);
-        return {map_.rotation * axes, map_.rotation * (unit_ * origin) + origin_, unit_, skew};
+    const GroupFrame& frameOf(const OrientedGroup& group) {
+        const std::size_t place = (reinterpret_cast<std::uintptr_t>(&group) / sizeof(OrientedGroup)) % keptFrames;
+        if (ofFrame_[place] != &group) {
+            ofFrame_[place] = &group;
+            frames_[place] = makeFrame(group);
+        }
+        return frames_[place];
     }
 
-    OrientedBounds boundsOf(const Node& node) const {
+    OrientedBounds boundsOf(const Node& node) {
         if (!node.group) {
             const glm::dvec3 half = 0.5 * unit_ * glm::dvec3(tree().size);
             return {map_.rotation, map_.rotation * half + origin_, half};
         }
-        const GroupFrame frame = frameOf(*node.group);
+        const GroupFrame& frame = frameOf(*node.group);
         glm::dvec3 lower, upper;
         for (int k = 0; k < 3; ++k) {
             lower[k] = unit_ * double(node.group->lower[k][node.slot]);
@@ -112,12 +115,34 @@ class PosedTree {
         return {triangle, map_(at + mesh_.featureOf(triangle, at).offset)};
     }
 
+    // The squared size of a node's box, to compare nodes by.
+    double size2Of(const Node& node) const {
+        glm::dvec3 half(tree().size);
+        if (node.group)
+            for (int k = 0; k < 3; ++k)
+                half[k] = double(node.group->upper[k][node.slot] - node.group->lower[k][node.slot]);
+        return unit_ * unit_ * glm::dot(half, half);
+    }
+
   private:
+    static constexpr std::size_t keptFrames = 64;
+
+    GroupFrame makeFrame(const OrientedGroup& group) const {
+        glm::dmat3 stored;
+        for (int k = 0; k < 3; ++k) stored[k] = glm::dvec3(group.axes[k][0], group.axes[k][1], group.axes[k][2]);
+        const glm::dmat3 axes = orthonormal(stored), off = axes - stored;
+        const double skew = std::max({glm::length(off[0]), glm::length(off[1]), glm::length(off[2])});
+        const glm::dvec3 origin(group.origin[0], group.origin[1], group.origin[2]);
+        return {map_.rotation * axes, map_.rotation * (unit_ * origin) + origin_, unit_, skew};
+    }
+
     const MeshTree& mesh_;
     const Similarity& map_;
     double unit_;
     glm::dvec3 origin_;
     glm::dmat3 linear_;
+    std::array<const OrientedGroup*, keptFrames> ofFrame_;
+    std::array<GroupFrame, keptFrames> frames_;
 };
 
 // Lower bounds of the squared distances from a box to the boxes of a group: the largest of the distances of their
@@ -191,15 +216,43 @@ struct LeafTriangles {
             const auto end = indices.begin() + std::ptrdiff_t(count);
             if (std::find(indices.begin(), end, triangle) != end) continue;
             indices[count] = triangle;
-            corners[count++] = mesh.corners(triangle);
+            corners[count] = mesh.corners(triangle);
+            setLanes(count++);
         }
+        // lanes without a triangle repeat the last one
+        for (std::size_t i = count; i < treeWidth; ++i)
+            for (int k = 0; k < 3; ++k)
+                for (int axis = 0; axis < 3; ++axis) lanes[k][axis][i] = lanes[k][axis][count - 1];
     }
 
     std::uint32_t leaf = noTriangle;
     std::size_t count = 0;
     std::array<std::uint32_t, treeWidth> indices;
     std::array<TriangleCorners, treeWidth> corners;
+    alignas(64) double lanes[3][3][treeWidth];  // the corners, by corner, then by axis
+
+  private:
+    void setLanes(std::size_t i) {
+        for (int k = 0; k < 3; ++k)
+            for (int axis = 0; axis < 3; ++axis) lanes[k][axis][i] = corners[i][std::size_t(k)][axis];
+    }
 };
+
+// The triangles of a leaf that are nearer to a triangle than a limit, as bits.
+unsigned nearerThan(const TriangleCorners& triangle, const LeafTriangles& leaf, double limit2) {
+    using D = hn::CappedTag<double, treeWidth>;
+    const D tag;
+    const TriangleLanes<D> one(sameInAll(tag, triangle[0]), sameInAll(tag, triangle[1]), sameInAll(tag, triangle[2]));
+    unsigned near = 0;
+    for (std::size_t i = 0; i < leaf.count; i += hn::Lanes(tag)) {
+        const TriangleLanes<D> all(loadLanes(tag, leaf.lanes[0], i), loadLanes(tag, leaf.lanes[1], i),
+                                   loadLanes(tag, leaf.lanes[2], i));
+        std::uint8_t bits[8] = {};
+        hn::StoreMaskBits(tag, hn::Lt(triangleDistance2(tag, one, all), hn::Set(tag, limit2)), bits);
+        near |= unsigned(bits[0]) << i;
+    }
+    return near & ((1u << leaf.count) - 1);
+}
 
 class PairSearch {
   public:
@@ -239,12 +292,11 @@ class PairSearch {
                 measureLeaves(pair.a.index, pair.b.index);
                 continue;
             }
-            const OrientedBounds boundsA = a_.boundsOf(pair.a), boundsB = b_.boundsOf(pair.b);
-            if (leafB || (!leafA && boundsA.size2() >= boundsB.size2()))
-                open(a_, pair.a.index, boundsB, -direction_,
+            if (leafB || (!leafA && a_.size2Of(pair.a) >= b_.size2Of(pair.b)))
+                open(a_, pair.a.index, b_.boundsOf(pair.b), -direction_,
                      [&](const Node& child) { return std::pair(child, pair.b); });
             else
-                open(b_, pair.b.index, boundsA, direction_,
+                open(b_, pair.b.index, a_.boundsOf(pair.a), direction_,
                      [&](const Node& child) { return std::pair(pair.a, child); });
         }
         return best_;
@@ -258,7 +310,7 @@ class PairSearch {
 
     // Replaces a node by its children that may be near the other one, the nearest last.
     template <class MakePair>
-    void open(const PosedTree& mesh, std::uint32_t node, const OrientedBounds& other, const glm::dvec3& direction,
+    void open(PosedTree& mesh, std::uint32_t node, const OrientedBounds& other, const glm::dvec3& direction,
               MakePair&& pairOf) {
         const OrientedGroup& group = mesh.group(node);
         alignas(64) double bounds2[treeWidth];
@@ -277,21 +329,21 @@ class PairSearch {
         ofA_.take(a_, a);
         ofB_.take(b_, b);
         const LeafTriangles &ofA = ofA_, &ofB = ofB_;
-        // measuring changes the direction: the bounds of this pair need one and the same
         const auto along = [direction = direction_](const TriangleCorners& c) {
             return std::array{glm::dot(direction, c[0]), glm::dot(direction, c[1]), glm::dot(direction, c[2])};
         };
-        std::array<double, treeWidth> farthest{};
+        double farthest = -std::numeric_limits<double>::infinity();
         for (std::size_t k = 0; k < ofB.count; ++k) {
             const auto heights = along(ofB.corners[k]);
-            farthest[k] = *std::max_element(heights.begin(), heights.end());
+            farthest = std::max(farthest, *std::max_element(heights.begin(), heights.end()));
         }
         for (std::size_t i = 0; i < ofA.count; ++i) {
             const auto heights = along(ofA.corners[i]);
-            const double nearest = *std::min_element(heights.begin(), heights.end());
-            for (std::size_t k = 0; k < ofB.count; ++k)
-                if (nearest - farthest[k] < limit_)
-                    measure(ofA.indices[i], ofA.corners[i], ofB.indices[k], ofB.corners[k]);
+            if (!(*std::min_element(heights.begin(), heights.end()) - farthest < limit_)) continue;
+            for (unsigned near = nearerThan(ofA.corners[i], ofB, limit2_); near != 0; near &= near - 1) {
+                const auto k = std::size_t(std::countr_zero(near));
+                measure(ofA.indices[i], ofA.corners[i], ofB.indices[k], ofB.corners[k]);
+            }
         }
     }
 

@@ -48,7 +48,7 @@ HWY_INLINE VectorLanes<D> cross(const VectorLanes<D>& a, const VectorLanes<D>& b
 
 /// Returns three arrays from index `i` on as vectors.
 template <class D, std::size_t n>
-HWY_INLINE VectorLanes<D> loadLanes(D tag, const float (&from)[3][n], std::size_t i) {
+HWY_INLINE VectorLanes<D> loadLanes(D tag, const hn::TFromD<D> (&from)[3][n], std::size_t i) {
     return {hn::Load(tag, from[0] + i), hn::Load(tag, from[1] + i), hn::Load(tag, from[2] + i)};
 }
 

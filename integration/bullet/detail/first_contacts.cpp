@@ -225,8 +225,7 @@ class FirstContactSearch {
     Motions metBy(std::uint32_t k, float tolerances) const {
         Motions met = 0;
         for (std::size_t n = 0; n < perturbations_.size(); ++n) {
-            if (separations_.of(k, perturbations_[n]) <=
-                minSeparations_[n] + tolerances * toleranceOf(n))
+            if (separations_.of(k, perturbations_[n]) <= minSeparations_[n] + tolerances * toleranceOf(n))
                 met |= Motions(1) << n;
         }
         return met;
@@ -247,8 +246,7 @@ class FirstContactSearch {
     /// Whether a kept contact touches not much later than the first one in a motion.
     bool isNearlyMet(std::size_t n) const {
         if (isPressAtRest(n)) return false;
-        return separations_.minOf(kept_, perturbations_[n]) <=
-               minSeparations_[n] + hysteresis * toleranceOf(n);
+        return separations_.minOf(kept_, perturbations_[n]) <= minSeparations_[n] + hysteresis * toleranceOf(n);
     }
 
     /// Whether every motion that meets this contact first is covered by another kept contact.
