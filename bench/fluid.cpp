@@ -185,7 +185,7 @@ void measureAt(const std::string& name, const Mesh& mesh, float resolution) {
     std::fflush(stdout);
 }
 
-// Error of fill() by distance from the surface [voxels].
+// Error of extend() by distance from the surface [voxels].
 struct Shell {
     double from, to;
     double sum = 0, largest = 0;
@@ -196,13 +196,13 @@ void fillAt(const std::string& name, const Mesh& mesh, float resolution) {
     const float voxelSize = voxelSizeFor(mesh, resolution);
     const LevelSet band = build(mesh, {.voxelSize = voxelSize});
     const Stopwatch watch;
-    const LevelSet filled = fluid::fill(band, farthest * voxelSize);
+    const LevelSet extended = fluid::extend(band, farthest * voxelSize);
     const double seconds = watch.seconds();
     const test::Truth truth(mesh);
     std::vector<openvdb::Coord> voxels;
-    for (auto v = filled.grids().distance->cbeginValueOn(); v; ++v) voxels.push_back(v.getCoord());
+    for (auto v = extended.grids().distance->cbeginValueOn(); v; ++v) voxels.push_back(v.getCoord());
     std::shuffle(voxels.begin(), voxels.end(), std::mt19937(7));
-    const auto values = filled.grids().distance->getConstAccessor();
+    const auto values = extended.grids().distance->getConstAccessor();
     std::array<Shell, 3> shells{{{3, 8}, {8, 16}, {16, 32}}};
     int wrong = 0;
     for (const openvdb::Coord& at : voxels) {
@@ -211,7 +211,7 @@ void fillAt(const std::string& name, const Mesh& mesh, float resolution) {
         const auto shell = std::ranges::find_if(
             shells, [&](const Shell& s) { return std::abs(value) >= s.from && std::abs(value) < s.to; });
         if (shell == shells.end() || shell->count == samplesPerShell) continue;
-        const openvdb::Vec3d p = filled.grids().distance->indexToWorld(at);
+        const openvdb::Vec3d p = extended.grids().distance->indexToWorld(at);
         const double exact = truth.signedDistance({p.x(), p.y(), p.z()}) / double(voxelSize);
         wrong += (exact < 0) != (value < 0);
         shell->sum += std::abs(value - exact);
@@ -250,7 +250,7 @@ void fluidBench(const Options& options) {
     for (const std::string& name : options.meshes)
         for (const float resolution : options.resolutions) measureAt(name, meshOf(name), resolution);
     fmt::print(
-        "\nDistances beyond the band by fill(), {:g} voxels far, against the mesh's own: errors in voxels, mean / "
+        "\nDistances beyond the band by extend(), {:g} voxels far, against the mesh's own: errors in voxels, mean / "
         "largest, of a\n"
         "sample of {} voxels in each column.\n\n"
         "| mesh | voxels | ms | 3 to 8 away | 8 to 16 | 16 to 32 | wrong signs |\n|---|---|---|---|---|---|---|\n",

@@ -231,10 +231,10 @@ LevelSet buildField(BuildArguments& a, const Mesh& mesh, BuildOutcome& outcome) 
     outcome.inspect = inspecting.seconds();
     a.options.inspected = outcome.report ? &*outcome.report : nullptr;
     LevelSet field = timedBuild(mesh, a, outcome);
-    if (a.fill) {
-        const Stopwatch filling;
-        field = fluid::fill(field);
-        outcome.fill = filling.seconds();
+    if (a.extend) {
+        const Stopwatch extending;
+        field = fluid::extend(field);
+        outcome.extend = extending.seconds();
     }
     return a.body ? timedBody(mesh, field, a, outcome) : field;
 }
@@ -258,7 +258,7 @@ Json toJson(const BuildArguments& a, const BuildOutcome& o, const Mesh& mesh, co
                 {"inspect", o.inspect},
                 {"build", o.build},
                 {"parts", {{"tiles", o.times.tiles}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
-                {"farFill", o.fill},
+                {"extend", o.extend},
                 {"body", o.body},
                 {"write", o.write}}},
               {"peakRssBytes", peakMemory()}};
@@ -274,7 +274,7 @@ CLI::Option_group* addBuildOptions(CLI::App& command, BuildArguments& a) {
     addMachine(command, a);
     addBody(command, a);
     command.add_flag("--triangles", a.options.triangles, "also store the nearest triangle of each voxel");
-    command.add_flag("--fill", a.fill, "extend the distances to all voxels of the field's bounding box");
+    command.add_flag("--extend", a.extend, "extend the distances to all voxels of the field's bounding box");
     command.add_flag("--half-float", a.stored.halfFloat, "store 16-bit distances");
     return size;
 }

@@ -32,7 +32,7 @@ struct BuildArguments {
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
     ColliderOptions collider;
-    bool fill = false, body = false, noMesh = false, report = false, json = false;
+    bool extend = false, body = false, noMesh = false, report = false, json = false;
     CLI::Option *resolutionGiven = nullptr, *halfGiven = nullptr, *exteriorGiven = nullptr, *interiorGiven = nullptr;
     CLI::Option* gapGiven = nullptr;
     std::vector<CLI::Option*> bodyOptions;
@@ -49,7 +49,7 @@ struct BuildOutcome {
     std::optional<MeshReport> report;
     std::string device;
     BuildTimes times;
-    double read = 0, inspect = 0, build = 0, fill = 0, body = 0, write = 0;
+    double read = 0, inspect = 0, build = 0, extend = 0, body = 0, write = 0;
 };
 
 /// Adds all options that determine a field. Returns the group of --voxel-size and --resolution, at most one of which
@@ -65,7 +65,7 @@ void checkBuildOptions(BuildArguments& arguments);
 void setSizes(BuildArguments& arguments, const Mesh& mesh);
 
 /// Builds a field with all that the options request. The arguments then refer to the outcome's report.
-/// Throws as build(), fluid::fill() and withBody() do.
+/// Throws as build(), fluid::extend() and withBody() do.
 LevelSet buildField(BuildArguments& arguments, const Mesh& mesh, BuildOutcome& outcome);
 
 /// What `bilayer build --json` prints.

@@ -42,21 +42,21 @@ void check(const openvdb::FloatGrid& band, const openvdb::CoordBBox& box) {
 }
 
 /// The field with other distances. The band's guarantees do not hold for swept values.
-LevelSet withDistances(const LevelSet& levelSet, const openvdb::FloatGrid::Ptr& filled, float exterior,
+LevelSet withDistances(const LevelSet& levelSet, const openvdb::FloatGrid::Ptr& extended, float exterior,
                        float interior) {
-    openvdb::tools::changeAsymmetricLevelSetBackground(filled->tree(), exterior, -interior);
-    filled->removeMeta(metadata::errorBound);
-    filled->removeMeta(metadata::interiorWidth);
-    if (interior != exterior) filled->insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(interior));
-    openvdb::tools::pruneLevelSet(filled->tree());
+    openvdb::tools::changeAsymmetricLevelSetBackground(extended->tree(), exterior, -interior);
+    extended->removeMeta(metadata::errorBound);
+    extended->removeMeta(metadata::interiorWidth);
+    if (interior != exterior) extended->insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(interior));
+    openvdb::tools::pruneLevelSet(extended->tree());
     auto grids = std::make_shared<Grids>(levelSet.grids());
-    grids->distance = filled;
+    grids->distance = extended;
     return LevelSet(std::move(grids));
 }
 
 }  // namespace
 
-LevelSet fill(const LevelSet& levelSet) {
+LevelSet extend(const LevelSet& levelSet) {
     const openvdb::FloatGrid& band = *levelSet.grids().distance;
     const openvdb::CoordBBox bounds = band.evalActiveVoxelBoundingBox();
     check(band, bounds);
@@ -68,26 +68,27 @@ LevelSet fill(const LevelSet& levelSet) {
                          levelSet.interiorWidth());
 }
 
-LevelSet fill(const LevelSet& levelSet, float distance) {
+LevelSet extend(const LevelSet& levelSet, float distance) {
     if (!(distance > 0) || !std::isfinite(distance))
-        throw std::invalid_argument("the distance to fill to must be positive");
+        throw std::invalid_argument("the distance to extend to must be positive");
     const openvdb::FloatGrid& band = *levelSet.grids().distance;
     const float exterior = std::max(distance, levelSet.exteriorWidth()),
                 interior = std::max(distance, levelSet.interiorWidth());
     const float narrower = std::min(levelSet.exteriorWidth(), levelSet.interiorWidth());
     const double layers = std::ceil((double(distance) - double(narrower)) / double(levelSet.voxelSize())) + spareLayers;
     openvdb::CoordBBox box = band.evalActiveVoxelBoundingBox();
-    if (layers > double(maxLayers)) throw std::invalid_argument("the distance to fill to is too far for these voxels");
+    if (layers > double(maxLayers))
+        throw std::invalid_argument("the distance to extend to is too far for these voxels");
     box.expand(std::max(int(layers), 0));
     check(band, box);
     if (layers <= spareLayers) return levelSet;
-    const auto filled = openvdb::tools::dilateSdf(band, int(layers), openvdb::tools::NN_FACE_EDGE_VERTEX);
-    openvdb::tree::LeafManager<openvdb::FloatTree> leaves(filled->tree());
+    const auto extended = openvdb::tools::dilateSdf(band, int(layers), openvdb::tools::NN_FACE_EDGE_VERTEX);
+    openvdb::tree::LeafManager<openvdb::FloatTree> leaves(extended->tree());
     leaves.foreach ([&](openvdb::FloatTree::LeafNodeType& leaf, std::size_t) {
         for (auto voxel = leaf.beginValueOn(); voxel; ++voxel)
             if (*voxel >= exterior || *voxel <= -interior) voxel.setValueOff();
     });
-    return withDistances(levelSet, filled, exterior, interior);
+    return withDistances(levelSet, extended, exterior, interior);
 }
 
 }  // namespace bilayer::fluid

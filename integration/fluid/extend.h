@@ -9,10 +9,10 @@ namespace bilayer::fluid {
 /// sweeping computes the others from them. It is first order: errors grow with the distance from the band, and no bound
 /// holds for all voxels, so errorBound() is NaN. The result is dense in memory. Throws std::invalid_argument for a
 /// field without inside, where no distance can start, and for a box that does not fit the machine's memory.
-LevelSet fill(const LevelSet& levelSet);
+LevelSet extend(const LevelSet& levelSet);
 
 /// Extends the field up to a distance from the surface on either side [m], which is then the field's width. A side of
 /// the band that is as wide already keeps its own width. Also throws for a distance that is not positive or not finite.
-LevelSet fill(const LevelSet& levelSet, float distance);
+LevelSet extend(const LevelSet& levelSet, float distance);
 
 }  // namespace bilayer::fluid

@@ -203,7 +203,7 @@ SharedMesh extract(const LevelSet& levelSet, float isovalue, float adaptivity) {
 
 LevelSet extended(const LevelSet& levelSet, std::optional<float> distance) {
     const py::gil_scoped_release release;
-    return distance ? fluid::fill(levelSet, *distance) : fluid::fill(levelSet);
+    return distance ? fluid::extend(levelSet, *distance) : fluid::extend(levelSet);
 }
 
 constexpr const char* levelSetDoc = R"(An immutable narrow-band signed distance field, in an OpenVDB grid.

@@ -216,7 +216,7 @@ TEST_CASE("a rebuild is a build in full where old blocks cannot be copied") {
     const auto path = test::scratch("rounded.vdb");
     writeVdb(path, build(before, plain), {.halfFloat = true});
     CHECK(filledInFull(readVdb(path), plain));
-    // swept, as by fluid::fill(): the error bound is unknown, and other voxels are active
+    // swept, as by fluid::extend(): the error bound is unknown, and other voxels are active
     auto swept = std::make_shared<Grids>();
     const auto grid = build(before, plain).grids().distance->deepCopy();
     grid->removeMeta(metadata::errorBound);

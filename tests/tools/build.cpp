@@ -170,7 +170,7 @@ TEST_CASE("every option of build has an effect") {
     CHECK(wide["exteriorWidth"].get<double>() == Approx(5));
     CHECK(wide["interiorWidth"].get<double>() == Approx(1));
     CHECK(wide["bandUnit"] == "voxels");
-    CHECK(with({"--fill"})["activeVoxels"] > plain["activeVoxels"]);
+    CHECK(with({"--extend"})["activeVoxels"] > plain["activeVoxels"]);
     CHECK(with({"--triangles"})["memoryBytes"] > plain["memoryBytes"]);
     CHECK(readVdb(output).grids().triangle);
 
@@ -227,7 +227,7 @@ TEST_CASE("widths may be given in the mesh's unit") {
 
 TEST_CASE("a field without gaps has no error bound") {
     const std::string output = scratch("filled.vdb").string();
-    CHECK(buildSphere(output, {"--voxel-size", "0.05", "--fill"})["errorBound"].is_null());
+    CHECK(buildSphere(output, {"--voxel-size", "0.05", "--extend"})["errorBound"].is_null());
     CHECK(run({"info", output, "--json"}).json()["errorBound"].is_null());
 }
 

@@ -87,7 +87,7 @@ TEST_CASE("build --body stores the data of bodies, and info reports it") {
     CHECK_FALSE(Collider(readVdb(output)).data().body.mesh);
     CHECK(std::filesystem::file_size(output) + body.mesh().triangles.size() * sizeof(glm::uvec3) < whole);
     CHECK_THAT(run({"info", output}).out, Catch::Contains("no mesh"));
-    buildSphere(output, {"--voxel-size", "0.05", "--body", "--half-float", "--triangles", "--fill"});
+    buildSphere(output, {"--voxel-size", "0.05", "--body", "--half-float", "--triangles", "--extend"});
     CHECK(Collider(readVdb(output)).data().points().points().size() == body.data().points().points().size());
 }
 
