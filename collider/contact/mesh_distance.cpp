@@ -238,6 +238,19 @@ struct LeafTriangles {
     }
 };
 
+// The triangles of the leaves of a mesh that were measured last.
+class LeafCache {
+  public:
+    const LeafTriangles& of(const PosedTree& mesh, std::uint32_t leaf) {
+        LeafTriangles& triangles = leaves_[leaf % leaves_.size()];
+        triangles.take(mesh, leaf);
+        return triangles;
+    }
+
+  private:
+    std::array<LeafTriangles, 16> leaves_;
+};
+
 // The triangles of a leaf that are nearer to a triangle than a limit, as bits.
 unsigned nearerThan(const TriangleCorners& triangle, const LeafTriangles& leaf, double limit2) {
     using D = hn::CappedTag<double, treeWidth>;
@@ -326,9 +339,7 @@ class PairSearch {
     }
 
     void measureLeaves(std::uint32_t a, std::uint32_t b) {
-        ofA_.take(a_, a);
-        ofB_.take(b_, b);
-        const LeafTriangles &ofA = ofA_, &ofB = ofB_;
+        const LeafTriangles &ofA = leavesA_.of(a_, a), &ofB = leavesB_.of(b_, b);
         const auto along = [direction = direction_](const TriangleCorners& c) {
             return std::array{glm::dot(direction, c[0]), glm::dot(direction, c[1]), glm::dot(direction, c[2])};
         };
@@ -366,7 +377,7 @@ class PairSearch {
     double room_, limit_, limit2_;
     MeshDistance best_;
     glm::dvec3 direction_{0};  // of the closest pair, from B to A: triangles are no closer than along it
-    LeafTriangles ofA_, ofB_;  // of the last leaves
+    LeafCache leavesA_, leavesB_;
     std::size_t pending_ = 0;
     std::array<NodePair, maxPending> stack_;
 };
