@@ -1,0 +1,121 @@
+// Times of impact of moving bodies against many distances along their motion, each by brute force over all pairs of
+// triangles in double precision.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <limits>
+#include <stdexcept>
+
+#include <bilayer/collider/distance.h>
+#include <bilayer/sdf/build.h>
+#include "demos/shared/shapes.h"
+#include "surface_distance.h"
+#include "tests/support/random.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+namespace {
+
+Collider colliderOf(const Mesh& mesh) {
+    return {mesh, build(mesh, {.voxelSize = bounds(mesh).longestSide() / 32})};
+}
+
+// The body after a fraction of its motion, by quaternions in double precision.
+Placed after(const Placed& body, double fraction) {
+    const glm::dvec3 turned = fraction * glm::dvec3(body.motion.rotation);
+    const double angle = glm::length(turned);
+    const glm::dquat spin = angle > 0 ? glm::angleAxis(angle, turned / angle) : glm::dquat(1, 0, 0, 0);
+    return {body.collider,
+            {body.pose.position + float(fraction) * body.motion.displacement,
+             glm::quat(spin * glm::dquat(body.pose.rotation))},
+            body.scale};
+}
+
+Pose randomPose(Random& random, float distance) {
+    return {distance * random.direction(), glm::angleAxis(float(random(0, 3)), random.direction())};
+}
+
+}  // namespace
+
+TEST_CASE("Moving bodies touch when samples of their motion say so, and never pass through each other") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Collider shapes[] = {colliderOf(shapes::torus(0.5f, 0.2f, 12, 8)),
+                               colliderOf(shapes::box({0.4f, 0.3f, 0.02f})), colliderOf(shapes::sphere(0.4f, 1))};
+    int hits = 0, misses = 0;
+    for (int round = 0; round < 150; ++round) {
+        Placed a{shapes[round % 3], randomPose(random, 0), float(random(0.5, 2))};
+        Placed b{shapes[round / 3 % 3], randomPose(random, 3), float(random(0.5, 2))};
+        // towards each other, some at many sizes a step, so that they meet, graze, or miss
+        const float far = random(0, 1) < 0.3 ? 40.f : 6.f;
+        b.motion = {-far / 3 * (b.pose.position + 0.7f * random.direction()), float(random(0, 6)) * random.direction()};
+        a.motion = {0.5f * random.direction(), float(random(0, 6)) * random.direction()};
+        const float voxel =
+            std::min(a.scale * a.collider.field().voxelSize(), b.scale * b.collider.field().voxelSize());
+        CAPTURE(round, far);
+        const Impact impact = timeOfImpact(a, b);
+        const Impact swapped = timeOfImpact(b, a);
+        CHECK(impact.found == swapped.found);
+        (impact.found ? hits : misses) += 1;
+        if (impact.found) {
+            const double then = surfaceDistance(after(a, double(impact.fraction)), after(b, double(impact.fraction)));
+            CHECK(then <= 0.06 * double(voxel));
+            CHECK(then > 0);
+            CHECK(impact.distance.distance == Approx(then).margin(2e-5));
+            CHECK(std::abs(impact.fraction - swapped.fraction) * far <= 0.2f * voxel + 1e-4f);
+        }
+        // no sample before it touches
+        constexpr int samples = 300;
+        for (int i = 0; i <= samples; ++i) {
+            const double at = double(impact.found ? impact.fraction : 1) * i / samples;
+            const BodyDistance separation = distance(after(a, at), after(b, at));
+            if (!(separation.distance > 0) || separation.overlap != Overlap::none) FAIL_CHECK("touches at " << at);
+        }
+    }
+    CHECK(hits > 30);
+    CHECK(misses > 10);
+}
+
+TEST_CASE("A thin plate is met by a fast body at the time that the geometry says") {
+    const Collider plate = colliderOf(shapes::box({1, 1, 0.01f})), ball = colliderOf(shapes::sphere(0.1f, 5));
+    Placed moving{ball, {{0.3f, 0.2f, 5}}};
+    moving.motion.displacement = {0, 0, -1000};
+    const Placed fixed{plate};
+    const Impact impact = timeOfImpact(moving, fixed);
+    REQUIRE(impact.found);
+    CHECK(1000 * impact.fraction == Approx(5 - 0.1 - 0.01).margin(0.1 * double(ball.field().voxelSize())));
+    CHECK(impact.distance.normal.z == Approx(1).margin(1e-3));
+    CHECK(impact.poseA.position.z == Approx(0.11).margin(1e-3));
+    CHECK_FALSE(timeOfImpact(fixed, Placed{ball, {{0.3f, 0.2f, 5}}}).found);
+}
+
+TEST_CASE("A rotating bar meets a post where its end comes round") {
+    const Collider bar = colliderOf(shapes::box({1, 0.05f, 0.05f})), post = colliderOf(shapes::box({0.05f, 0.05f, 1}));
+    Placed rotating{bar};
+    rotating.motion.rotation = {0, 0, glm::radians(180.f)};
+    const Placed fixed{post, {{0, 0.9f, 0}}};
+    const Impact impact = timeOfImpact(rotating, fixed);
+    REQUIRE(impact.found);
+    // the leading face at a distance of 0.05 from the axis meets the near corner of the post at (0.05, 0.85)
+    const double angle = std::atan2(0.85, 0.05) - std::asin(0.05 / std::hypot(0.85, 0.05));
+    CHECK(double(impact.fraction) * 180 == Approx(glm::degrees(angle)).margin(0.3));
+}
+
+TEST_CASE("Bodies that overlap touch at the start, and motions that are none are refused") {
+    const Collider box = colliderOf(shapes::box({0.5f, 0.5f, 0.5f}));
+    Placed a{box}, b{box, {{0.9f, 0, 0}}};
+    a.motion.displacement = {-1, 0, 0};
+    const Impact impact = timeOfImpact(a, b);
+    CHECK(impact.found);
+    CHECK(impact.fraction == 0);
+    CHECK(impact.distance.overlap == Overlap::surfaces);
+    b.motion.rotation = {0, std::numeric_limits<float>::quiet_NaN(), 0};
+    CHECK_THROWS_AS(timeOfImpact(a, b), std::invalid_argument);
+    b.motion.rotation = {0, 2000, 0};
+    CHECK_THROWS_WITH(timeOfImpact(a, b), Catch::Matchers::Contains("1000 rad"));
+}
