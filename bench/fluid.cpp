@@ -241,7 +241,8 @@ void fluidBench(const Options& options) {
     fmt::print(
         "\nVolume and area by LevelSetMeasure against the mesh's own [%], and how far |gradient| is from 1 within a "
         "voxel\n"
-        "of the surface, in the mean, everywhere and off creases: of seeds by the mesh, by its field at a pose askew, "
+        "of the surface, in the mean, everywhere and off creases: of seeds by the mesh, by its field in a rotated "
+        "pose, "
         "by\n"
         "meshToLevelSet.\n\n"
         "| mesh | voxels | volume | area | slope | off creases | field: volume | area | slope | off creases | OpenVDB: "

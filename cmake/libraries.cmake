@@ -2,7 +2,9 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-option(BUILD_SHARED_LIBS "Build shared libraries" OFF)
+if(PROJECT_IS_TOP_LEVEL)  # else it is the parent's
+  option(BUILD_SHARED_LIBS "Build shared libraries" OFF)
+endif()
 set(bilayer_components ${BILAYER_COMPONENTS})
 set(CMAKE_FIND_PACKAGE_NAME bilayer)
 set(bilayer_FIND_REQUIRED TRUE)

@@ -18,7 +18,7 @@ namespace {
 /// size.
 constexpr float frameRounding = 1e-2f, treeRounding = 3e-7f;
 /// Max count of nodes in a cube's entries.
-constexpr std::size_t maxNodes = BlockEntries::most * BlockEntry::slots;
+constexpr std::size_t maxNodes = BlockEntries::maxEntries * BlockEntry::slots;
 /// Entries are sized for the nodes of this fraction of the cubes; the other cubes use a coarser level. The size is
 /// estimated from `samples` cubes.
 constexpr double usual = 0.9;
@@ -121,8 +121,9 @@ class EntryBuilder {
     }
 
     void write(const NodeList& list, const glm::vec3& corner, BlockEntry* entries, int each) const {
-        constexpr float most = BlockEntries::regionUnits;
-        const float perVoxel = most / (side_ + 2 * reach_), room = room_ * perVoxel + 1.f / BlockEntries::placesPerUnit;
+        constexpr float highest = BlockEntries::regionUnits;
+        const float perVoxel = highest / (side_ + 2 * reach_),
+                    room = room_ * perVoxel + 1.f / BlockEntries::placesPerUnit;
         for (int i = 0; i < each; ++i) {
             std::memset(&entries[i], 0, sizeof(BlockEntry));
             std::memset(entries[i].lower, BlockEntries::regionUnits, sizeof entries[i].lower);
@@ -133,8 +134,8 @@ class EntryBuilder {
             for (int k = 0; k < 3; ++k) {
                 const float low = (list.lower[k][i] - corner[k]) * perVoxel - room;
                 const float high = (list.upper[k][i] - corner[k]) * perVoxel + room;
-                entry.lower[k][slot] = std::uint8_t(std::clamp(low, 0.f, most));
-                entry.upper[k][slot] = std::uint8_t(std::clamp(high + 1, 0.f, most));
+                entry.lower[k][slot] = std::uint8_t(std::clamp(low, 0.f, highest));
+                entry.upper[k][slot] = std::uint8_t(std::clamp(high + 1, 0.f, highest));
                 entry.nodes[slot][k] = std::uint8_t(list.nodes[i] >> 8 * k);
             }
         }
@@ -165,7 +166,7 @@ Need needOf(EntryBuilder builder, const std::vector<glm::ivec3>& cubes) {
     }
     const auto place = counts.begin() + std::ptrdiff_t(usual * double(counts.size() - 1));
     std::nth_element(counts.begin(), place, counts.end());
-    return {std::clamp(int((*place + BlockEntry::slots - 1) / BlockEntry::slots), 1, BlockEntries::most),
+    return {std::clamp(int((*place + BlockEntry::slots - 1) / BlockEntry::slots), 1, BlockEntries::maxEntries),
             double(withLeaves) >= usual * double(counts.size())};
 }
 

@@ -53,7 +53,7 @@ struct EntryPlace {
 class BlockEntries {
   public:
     static constexpr int placesPerUnit = 8, regionUnits = 255;
-    static constexpr int most = 6;  ///< max count of entries per cube
+    static constexpr int maxEntries = 6;  ///< max count of entries per cube
 
     BlockEntries() = default;
 

@@ -60,7 +60,7 @@ float minimaStepOf(const FieldFrame& frame) {
 
 // Summary of a block's coarse cells.
 struct BlockSummary {
-    std::array<float, blockParts> least;        // min value of the voxels around each coarse cell [m]
+    std::array<float, blockParts> lowest;       // min value of the voxels around each coarse cell [m]
     std::array<bool, blockParts> meetsSurface;  // a voxel is close enough to the surface, or both signs occur
 };
 
@@ -68,7 +68,7 @@ struct BlockSummary {
 struct Quarter {
     using FourFloats [[gnu::vector_size(16)]] = float;
 
-    float least[stride], most[stride];
+    float lowest[stride], highest[stride];
 
     explicit Quarter(const float* rows) {
         for (int z = 0; z < stride; z += 4) {
@@ -84,8 +84,8 @@ struct Quarter {
                     low = values < low ? values : low;
                     high = values > high ? values : high;
                 }
-            std::memcpy(least + std::min(z, stride - 4), &low, sizeof low);
-            std::memcpy(most + std::min(z, stride - 4), &high, sizeof high);
+            std::memcpy(lowest + std::min(z, stride - 4), &low, sizeof low);
+            std::memcpy(highest + std::min(z, stride - 4), &high, sizeof high);
         }
     }
 };
@@ -96,11 +96,11 @@ BlockSummary summaryOf(const float* block, float voxelSize) {
         const Quarter quarter(block + partSide * stride * ((i >> 2) * stride + (i >> 1 & 1)));
         for (int part = 0; part < perBlock; ++part) {
             const int first = part * partSide;
-            const float least = *std::min_element(&quarter.least[first], &quarter.least[first] + partSide + 1),
-                        most = *std::max_element(&quarter.most[first], &quarter.most[first] + partSide + 1);
-            summary.least[i + part] = least;
-            summary.meetsSurface[i + part] =
-                std::min(std::abs(least), std::abs(most)) <= nearSurface * voxelSize || (least < 0) != (most < 0);
+            const float lowest = *std::min_element(&quarter.lowest[first], &quarter.lowest[first] + partSide + 1),
+                        highest = *std::max_element(&quarter.highest[first], &quarter.highest[first] + partSide + 1);
+            summary.lowest[i + part] = lowest;
+            summary.meetsSurface[i + part] = std::min(std::abs(lowest), std::abs(highest)) <= nearSurface * voxelSize ||
+                                             (lowest < 0) != (highest < 0);
         }
     }
     return summary;
@@ -119,9 +119,9 @@ void store(const float* block, const FieldFrame& frame, float* to) {
 
 // Stores values in steps, with marks for those outside the band.
 void store(const float* block, const FieldFrame& frame, float step, std::int16_t* to) {
-    constexpr float most = FieldLayout::beyondOutside - 1;
+    constexpr float maxSteps = FieldLayout::beyondOutside - 1;
     for (int i = 0; i < FieldLayout::blockFloats; ++i) {
-        const auto steps = std::int16_t(std::clamp(std::nearbyint(block[i] / step), -most, most));
+        const auto steps = std::int16_t(std::clamp(std::nearbyint(block[i] / step), -maxSteps, maxSteps));
         const std::int16_t beyond = block[i] < 0 ? FieldLayout::beyondInside : FieldLayout::beyondOutside;
         to[i] = isBeyondBand(block[i], frame) ? beyond : steps;
     }
@@ -168,7 +168,7 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
             meets[i] = summary.meetsSurface;
             for (int k = 0; k < blockParts; ++k)
                 field.minima[i * blockParts + k] =
-                    std::int8_t(std::clamp(std::floor(summary.least[k] / minimaStep), -127.f, 127.f));
+                    std::int8_t(std::clamp(std::floor(summary.lowest[k] / minimaStep), -127.f, 127.f));
         }
     });
     return meets;

@@ -182,7 +182,7 @@ class EntrySearch {
     static constexpr int slotBits = 3, numberBits = 3, keyBits = slotBits + numberBits, placeBits = 3;
     static constexpr std::int32_t noKey = std::numeric_limits<std::int32_t>::max();
     static_assert(BlockEntry::slots == treeWidth - 1 && treeWidth == 1 << slotBits &&
-                  BlockEntries::most <= 1 << numberBits && BlockEntries::placesPerUnit == 1 << placeBits);
+                  BlockEntries::maxEntries <= 1 << numberBits && BlockEntries::placesPerUnit == 1 << placeBits);
     static constexpr std::size_t lanes = hn::MaxLanes(Ints()), entryVectors = treeWidth / lanes;
 
     // The last lane has no slot; the bytes loaded there belong to other members.
@@ -234,7 +234,7 @@ class EntrySearch {
     std::size_t vectors_;  // of keys
     float places2_;
     std::int32_t key_, nextKey_;
-    alignas(64) std::int32_t keys_[BlockEntries::most * treeWidth];
+    alignas(64) std::int32_t keys_[BlockEntries::maxEntries * treeWidth];
 };
 
 std::uint32_t searchAll(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound) {

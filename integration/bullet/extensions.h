@@ -58,7 +58,8 @@ struct ExtensionOptions {
 };
 
 /// Extends a world from its construction on. The world must outlive it. The user's own tick callbacks keep working,
-/// whether they are set before or after: pre-tick callbacks run before the extensions, others after them.
+/// whether they are set before or after: pre-tick callbacks run before the extensions, others after them. Set a
+/// pre-tick callback once: one that is set again before each step keeps the gyroscopic integration out of these steps.
 ///
 /// A world may have several of these. Only one of them may have ExtensionOptions::gyroscopicIntegration, since each
 /// integrator takes over the rotation of all bodies: the constructor of a second one throws std::invalid_argument and

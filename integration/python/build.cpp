@@ -17,6 +17,7 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "sdf/base/method_names.h"
 
 namespace bilayer::python {
 namespace {
@@ -24,12 +25,6 @@ namespace {
 /// How often a build looks for signals and reports progress.
 constexpr std::chrono::milliseconds pollInterval(20);
 
-constexpr std::array<std::pair<const char*, Method>, 4> methods{{{"exact", Method::exact},
-                                                                 {"double-layer", Method::doubleLayer},
-                                                                 {"pseudonormal", Method::pseudonormal},
-                                                                 {"prism", Method::prism}}};
-constexpr std::array<std::pair<const char*, Sign>, 4> signs{
-    {{"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}}};
 /// Options in errors of the library, and their names here.
 constexpr std::array<std::pair<const char*, const char*>, 5> optionNames{
     {{"voxelSize", "voxel_size"},
@@ -126,8 +121,9 @@ Request requestOf(const py::kwargs& given, const Mesh& mesh, const char* functio
     setVoxelSize(keywords, mesh, options);
     setBand(keywords, options);
     if (const auto word = keywords.take<std::string>("method", "a string"))
-        options.method = byWord(methods, *word, "method");
-    if (const auto word = keywords.take<std::string>("sign", "a string")) options.sign = byWord(signs, *word, "sign");
+        options.method = byWord(bilayer::detail::methodNames, *word, "method");
+    if (const auto word = keywords.take<std::string>("sign", "a string"))
+        options.sign = byWord(bilayer::detail::signNames, *word, "sign");
     keywords.set(options.gapVoxels, "gap_voxels", "a number");
     keywords.set(options.unite, "unite", "True or False");
     keywords.set(options.triangles, "triangles", "True or False");

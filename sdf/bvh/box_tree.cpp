@@ -46,7 +46,7 @@ std::uint64_t spread(std::uint64_t x) {
 void transformToHilbert(CurveCells& cells) {
     auto &x = cells.x[0], &y = cells.x[1], &z = cells.x[2];
     const auto undo = [&](int bit, std::uint32_t* v) {
-        for (std::size_t i = 0; i < CurveCells::most; ++i) {
+        for (std::size_t i = 0; i < CurveCells::capacity; ++i) {
             const std::uint32_t inverts = 0u - (v[i] >> bit & 1), low = (1u << bit) - 1;
             const std::uint32_t swapped = (x[i] ^ v[i]) & low & ~inverts;
             x[i] ^= (low & inverts) | swapped;
@@ -54,11 +54,11 @@ void transformToHilbert(CurveCells& cells) {
         }
     };
     for (int bit = bitsPerAxis - 1; bit > 0; --bit) {
-        for (std::size_t i = 0; i < CurveCells::most; ++i) x[i] ^= (0u - (x[i] >> bit & 1)) & ((1u << bit) - 1);
+        for (std::size_t i = 0; i < CurveCells::capacity; ++i) x[i] ^= (0u - (x[i] >> bit & 1)) & ((1u << bit) - 1);
         undo(bit, y);
         undo(bit, z);
     }
-    for (std::size_t i = 0; i < CurveCells::most; ++i) {
+    for (std::size_t i = 0; i < CurveCells::capacity; ++i) {
         y[i] ^= x[i];
         z[i] ^= y[i];
         std::uint32_t parity = z[i] >> 1;  // bit b: parity of the bits of z above b

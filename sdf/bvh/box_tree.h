@@ -50,8 +50,8 @@ inline constexpr std::uint64_t curveIndexMask = maxOnCurve - 1;
 
 /// Cell coordinates, stored as arrays per axis so that the compiler can vectorise.
 struct CurveCells {
-    static constexpr std::size_t most = 64;
-    std::uint32_t x[3][most];
+    static constexpr std::size_t capacity = 64;
+    std::uint32_t x[3][capacity];
 };
 
 /// Writes the keys of the items in the first `count` cells, whose indices start at `first`. Overwrites the cells.

@@ -111,7 +111,7 @@ void makeKeys(const TriangleParts& parts, const glm::ivec3& size, std::size_t fi
     constexpr double cells = curveCells;
     const double scale = cells / (3.0 * std::max({size.x, size.y, size.z}));
     CurveCells run{};
-    std::array<bool, CurveCells::most> isLong{};
+    std::array<bool, CurveCells::capacity> isLong{};
     for (std::size_t i = 0; i < count; ++i) {
         const TriangleCorners c = parts.corners(first + i);
         for (int k = 0; k < 3; ++k)
@@ -131,10 +131,10 @@ std::vector<std::uint32_t> addKeys(const TriangleParts& parts, const glm::ivec3&
     const std::size_t begin = keys.size();
     keys.resize(parts.count());
     tbb::enumerable_thread_specific<std::vector<std::uint32_t>> found;
-    const std::size_t runs = (keys.size() - begin + CurveCells::most - 1) / CurveCells::most;
+    const std::size_t runs = (keys.size() - begin + CurveCells::capacity - 1) / CurveCells::capacity;
     forAll(runs, progress, [&](std::size_t run) {
-        const std::size_t first = begin + run * CurveCells::most,
-                          count = std::min(CurveCells::most, keys.size() - first);
+        const std::size_t first = begin + run * CurveCells::capacity,
+                          count = std::min(CurveCells::capacity, keys.size() - first);
         makeKeys(parts, size, first, count, keys.data() + first, found.local());
     });
     std::vector<std::uint32_t> longOnes;

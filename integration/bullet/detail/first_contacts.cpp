@@ -194,7 +194,7 @@ class FirstContactSearch {
         }
         for (std::size_t i = kept_.size(); i-- > 0;)
             if (isSpare(i) && !mayBear(kept_[i])) leaveOut(i);
-        while (kept_.size() > maxContacts) leaveOut(leastNeeded());
+        while (kept_.size() > maxContacts) leaveOut(redundant());
         return kept_;
     }
 
@@ -259,7 +259,7 @@ class FirstContactSearch {
     }
 
     /// The redundant contact that is farthest away, or else the last one; but none that bears a body at rest.
-    std::size_t leastNeeded() const {
+    std::size_t redundant() const {
         std::size_t which = kept_.size();
         for (std::size_t i = 0; i < kept_.size(); ++i)
             if (isSpare(i) &&

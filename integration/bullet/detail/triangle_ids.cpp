@@ -18,10 +18,10 @@ namespace {
 class Search {
   public:
     Search(const glm::vec3& place, const glm::vec3& normal, float reach, float tolerance)
-        : place_(place), normal_(normal), least_(reach), tolerance_(tolerance) {}
+        : place_(place), normal_(normal), minDistance_(reach), tolerance_(tolerance) {}
 
     void offer(const btVector3* corners, TriangleId id) {
-        const float reach = least_ + tolerance_;
+        const float reach = minDistance_ + tolerance_;
         const btVector3 place = toBullet(place_), by(reach, reach, reach);
         if (!TestTriangleAgainstAabb2(corners, place - by, place + by)) return;
         const glm::vec3 a = toGlm(corners[0]), b = toGlm(corners[1]), c = toGlm(corners[2]);
@@ -31,7 +31,7 @@ class Search {
         const float length = glm::length(across);
         const float cosine = length > 0 ? std::abs(glm::dot(across, normal_)) / length : 0;
         const bool isNearer = distance < distance_ - tolerance_;
-        least_ = std::min(least_, distance);
+        minDistance_ = std::min(minDistance_, distance);
         if (found_ && !isNearer && cosine <= cosine_) return;
         found_ = id;
         distance_ = distance;
@@ -41,7 +41,7 @@ class Search {
 
   private:
     glm::vec3 place_, normal_;
-    float least_, tolerance_;
+    float minDistance_, tolerance_;
     std::optional<TriangleId> found_;
     float distance_ = 0, cosine_ = 0;  ///< of the result
 };
