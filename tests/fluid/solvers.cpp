@@ -21,8 +21,8 @@ namespace {
 
 constexpr float h = 0.02f, fine = 0.008f;  // voxel sizes [m]
 
-const fluid::Placement askew(Pose{{0.11f, -0.07f, 0.23f},
-                                  glm::angleAxis(0.8f, glm::normalize(glm::vec3(1, -2, 0.5f)))});
+const fluid::Placement rotated(Pose{{0.11f, -0.07f, 0.23f},
+                                    glm::angleAxis(0.8f, glm::normalize(glm::vec3(1, -2, 0.5f)))});
 
 Mesh placed(Mesh mesh, const fluid::Placement& placement) {
     for (glm::vec3& p : mesh.points) p = glm::vec3(placement.toWorld(p));
@@ -31,7 +31,7 @@ Mesh placed(Mesh mesh, const fluid::Placement& placement) {
 
 FloatGrid::Ptr seeded(const Mesh& mesh, float voxelSize = h) {
     const auto liquid = openvdb::createLevelSet<FloatGrid>(voxelSize, 3);
-    fluid::seed(*liquid, mesh, askew);
+    fluid::seed(*liquid, mesh, rotated);
     return liquid;
 }
 
@@ -87,7 +87,7 @@ TEST_CASE("LevelSetTracker has nothing to repair") {
     const openvdb::Index64 voxels = liquid->activeVoxelCount();
     openvdb::tools::LevelSetTracker<FloatGrid> tracker(*liquid);
     tracker.track();
-    const Distance after = distance(*liquid, placed(mesh, askew));
+    const Distance after = distance(*liquid, placed(mesh, rotated));
     CHECK(after.mean < 0.01);
     CHECK(after.largest < 0.05);
     CHECK(double(liquid->activeVoxelCount()) == Approx(double(voxels)).epsilon(0.03));
@@ -102,7 +102,7 @@ TEST_CASE("LevelSetAdvection carries a seeded body away as it is") {
     openvdb::tools::LevelSetAdvection<FloatGrid, Stream> advection(*liquid, stream);
     advection.setTemporalScheme(openvdb::math::TVD_RK3);
     advection.advect(0, 1);  // 21 voxels
-    fluid::Placement arrived = askew;
+    fluid::Placement arrived = rotated;
     arrived.pose.position += glm::vec3(0.31f, 0.17f, -0.23f);
     const Distance after = distance(*liquid, placed(mesh, arrived));
     CHECK(after.mean < 0.02);
