@@ -4,6 +4,7 @@
 
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/pose.h>
+#include <bilayer/collider/shapes.h>
 
 #include <cstdint>
 #include <functional>
@@ -16,7 +17,7 @@
 namespace bilayer {
 
 namespace detail {
-struct CandidateLists;
+struct ContactMemory;
 struct SampledBody;
 struct PointQuery;
 class FoundPoints;
@@ -37,6 +38,14 @@ struct Motion {
 /// A collider placed in the world, with an optional uniform scale. Body coordinates x map to pose.toWorld(scale * x).
 struct Placed {
     const Collider& collider;
+    Pose pose{};
+    float scale = 1;  ///< positive; also scales distances
+    Motion motion{};
+};
+
+/// A shape placed in the world, with an optional uniform scale. Body coordinates x map to pose.toWorld(scale * x).
+struct PlacedShape {
+    ContactShape shape;
     Pose pose{};
     float scale = 1;  ///< positive; also scales distances
     Motion motion{};
@@ -87,6 +96,10 @@ struct ContactOptions {
     /// to points that neither touch nor approach. Such contacts are redundant: the edges' own points meet the faces
     /// perpendicularly.
     bool keepsObliqueEdges = false;
+    /// Reduces the contacts to those that a solver needs: for each patch of contacts with similar normals up to twelve,
+    /// those that any small motion of the bodies meets first. They bear the same loads as all contacts. With a
+    /// ContactCache, the choice stays the same from step to step while the bodies hardly move.
+    bool reduced = false;
 };
 
 /// Diagnostics of collide().
@@ -104,10 +117,10 @@ class ContactCache {
     ContactCache(ContactCache&&) noexcept;
     ContactCache& operator=(ContactCache&&) noexcept;
 
-    detail::CandidateLists& data() { return *data_; }
+    detail::ContactMemory& data() { return *data_; }
 
   private:
-    std::unique_ptr<detail::CandidateLists> data_;
+    std::unique_ptr<detail::ContactMemory> data_;
 };
 
 /// Appends the contacts between two bodies: surface points of A in the field of B, then surface points of B in the
@@ -123,6 +136,13 @@ inline ContactReport collide(const Collider& a, const Pose& poseA, const Collide
                              const ContactOptions& options, std::vector<Contact>& contacts) {
     return collide(Placed{a, poseA}, Placed{b, poseB}, options, contacts);
 }
+
+/// Appends the contacts between two shapes; at least one of them is a collider. Two colliders make the contacts of the
+/// function above. Otherwise the features of contacts are: surface points and sharp edges of the collider as above; and
+/// numbers of the other shape's vertices, edges or triangles, which stay the same from step to step. Throws
+/// std::invalid_argument if neither is a collider, or a scale is not positive.
+ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactOptions& options,
+                      std::vector<Contact>& contacts, ContactCache* cache = nullptr);
 
 /// Samples the surface points of many bodies in each other's fields on a device. openclPointSampler() in
 /// cl/point_sampler.h makes one. Call it from one thread at a time.

@@ -4,6 +4,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "collider/contact/body_distance.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/mesh_distance.h"
 #include "collider/field/field_data.h"
@@ -21,10 +22,8 @@ constexpr double minDirection = 1e-7;
 constexpr int refinements = 40;
 constexpr float maxLead = 1024, minLead = 0.01f;
 
-/// Maps coordinates of the body to the world.
 Similarity toWorld(const Placed& body) {
-    return {glm::mat3_cast(glm::normalize(glm::dquat(body.pose.rotation))), double(body.scale),
-            glm::dvec3(body.pose.position)};
+    return detail::toWorld(body.pose, body.scale);
 }
 
 /// Two bodies, and the map from coordinates of the first to those of the second.
@@ -37,10 +36,6 @@ struct Bodies {
 
 double sizeOf(const Placed& body) {
     return double(body.scale) * double(body.collider.bounds().longestSide());
-}
-
-WitnessPoint witness(const Similarity& toWorld, const TrianglePoint& point, std::uint32_t triangle) {
-    return {toWorld(point.position), triangle, point.feature, point.index};
 }
 
 BodyDistance separated(const Bodies& bodies, const MeshDistance& found) {
@@ -120,12 +115,6 @@ BodyDistance deepestOf(const Bodies& bodies) {
             .a = {bToWorld(glm::dvec3(depth.point))},
             .b = {bToWorld(glm::dvec3(closest.position)), closest.triangle, closest.feature, closest.index},
             .normal = bodies.b.pose.rotation * closest.normal};
-}
-
-BodyDistance swapped(BodyDistance answer) {
-    std::swap(answer.a, answer.b);
-    answer.normal = -answer.normal;
-    return answer;
 }
 
 BodyDistance intersecting(const Bodies& bodies, const MeshDistance& touch) {

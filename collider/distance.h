@@ -60,6 +60,18 @@ struct DistanceStart {
 BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& options = {},
                       DistanceStart* start = nullptr);
 
+/// The same for two shapes, at least one of them a collider.
+///
+/// - A convex shape or a plane is solid. Separated shapes: the distance from the mesh of the collider is exact to 1e-6
+///   of the sizes of both bodies.
+/// - A shape that overlaps the collider: the depth of the deepest contact of collide(), and of the vertices of either
+///   body. The vertices of a rounded shape are those of its core, as deep as its radius takes them.
+/// - Triangles of a sheet have no inside: a collider that they do not cut is separated from them.
+///
+/// Throws std::invalid_argument if neither is a collider, or a scale is not positive.
+BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const DistanceOptions& options = {},
+                      DistanceStart* start = nullptr);
+
 struct ImpactOptions {
     /// Bodies touch at this separation [m]. At least 1e-5 of the size of the larger body counts. By default it is a
     /// twentieth of the smaller voxel.
@@ -86,5 +98,9 @@ struct Impact {
 /// step, most of which shorten the separation by a constant factor. Throws std::invalid_argument for motions that are
 /// not finite, or rotate by more than 1000 rad.
 Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options = {});
+
+/// The same for two shapes, at least one of them a collider. Throws std::invalid_argument also if neither is, and for a
+/// plane or a sheet of triangles that rotates: its far points would have no finite speed.
+Impact timeOfImpact(const PlacedShape& a, const PlacedShape& b, const ImpactOptions& options = {});
 
 }  // namespace bilayer

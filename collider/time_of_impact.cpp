@@ -4,8 +4,11 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <limits>
 #include <stdexcept>
+#include <variant>
 
+#include "collider/contact/shape_data.h"
 #include "sdf/base/finite.h"
 
 namespace bilayer {
@@ -27,47 +30,67 @@ void check(const Motion& motion) {
 }
 
 /// The body after a fraction of its motion.
-Placed after(const Placed& body, double fraction) {
+PlacedShape after(const PlacedShape& body, double fraction) {
     const glm::dvec3 turned = fraction * glm::dvec3(body.motion.rotation);
     const double angle = glm::length(turned);
     glm::dquat rotation(body.pose.rotation);
     if (angle > 0) rotation = glm::angleAxis(angle, turned / angle) * rotation;
     const glm::dvec3 position = glm::dvec3(body.pose.position) + fraction * glm::dvec3(body.motion.displacement);
-    return {body.collider, {glm::vec3(position), glm::quat(glm::normalize(rotation))}, body.scale};
+    return {body.shape, {glm::vec3(position), glm::quat(glm::normalize(rotation))}, body.scale};
 }
 
-/// The largest distance of a point of the body from its pose position [m].
-double radiusOf(const Placed& body) {
-    const Bounds& bounds = body.collider.bounds();
-    return double(body.scale) * glm::length(glm::dvec3(glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper))));
+/// What the search must know of a body.
+struct Extent {
+    double radius = 0;  ///< the largest distance of a point from the pose position [m]
+    double size = 0;    ///< the longest side of the bounds [m]; 0 for planes and sheets
+    double voxel = std::numeric_limits<double>::infinity();  ///< of the field, if it has one [m]
+};
+
+Extent extentOf(const Collider& collider, double scale) {
+    const Bounds& bounds = collider.bounds();
+    return {scale * glm::length(glm::dvec3(glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper)))),
+            scale * double(bounds.longestSide()), scale * double(collider.field().voxelSize())};
 }
 
-double toleranceFor(const Placed& a, const Placed& b, float asked) {
-    const auto size = [](const Placed& body) {
-        return double(body.scale) * double(body.collider.bounds().longestSide());
-    };
-    const auto voxel = [](const Placed& body) {
-        return double(body.scale) * double(body.collider.field().voxelSize());
-    };
-    const double wanted = asked > 0 ? double(asked) : defaultTolerance * std::min(voxel(a), voxel(b));
-    return std::max(wanted, minTolerance * std::max(size(a), size(b)));
+Extent extentOf(const Convex& convex, double scale) {
+    double radius = 0;
+    const auto vertices = convex.vertices();
+    for (std::uint32_t i = 0; i < vertices.size(); ++i)
+        radius = std::max(radius, double(glm::length(vertices[i]) + convex.radius(i)));
+    return {scale * radius, 2 * scale * radius};
+}
+
+Extent extentOf(const PlacedShape& body) {
+    const auto& shape = body.shape.data().shape;
+    const auto scale = double(body.scale);
+    if (const auto* collider = std::get_if<Collider>(&shape)) return extentOf(*collider, scale);
+    if (const auto* convex = std::get_if<Convex>(&shape)) return extentOf(*convex, scale);
+    if (body.motion.rotation != glm::vec3(0))
+        throw std::invalid_argument("a plane or a sheet of triangles has no end, and must not rotate");
+    return {};
+}
+
+double toleranceFor(const Extent& a, const Extent& b, float asked) {
+    const double wanted = asked > 0 ? double(asked) : defaultTolerance * std::min(a.voxel, b.voxel);
+    return std::max(wanted, minTolerance * std::max(a.size, b.size));
 }
 
 }  // namespace
 
-Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options) {
+Impact timeOfImpact(const PlacedShape& a, const PlacedShape& b, const ImpactOptions& options) {
     check(a.motion);
     check(b.motion);
-    const double tolerance = toleranceFor(a, b, options.tolerance);
-    const auto rotationOf = [](const Placed& body) {
-        return glm::length(glm::dvec3(body.motion.rotation)) * radiusOf(body);
+    const Extent ofA = extentOf(a), ofB = extentOf(b);
+    const double tolerance = toleranceFor(ofA, ofB, options.tolerance);
+    const auto rotationOf = [](const PlacedShape& body, const Extent& extent) {
+        return glm::length(glm::dvec3(body.motion.rotation)) * extent.radius;
     };
     // no two points approach by more in the whole motion
     const double approach = glm::distance(glm::dvec3(a.motion.displacement), glm::dvec3(b.motion.displacement)) +
-                            rotationOf(a) + rotationOf(b);
+                            rotationOf(a, ofA) + rotationOf(b, ofB);
     DistanceStart start;
     for (double fraction = 0; fraction <= 1;) {
-        const Placed nowA = after(a, fraction), nowB = after(b, fraction);
+        const PlacedShape nowA = after(a, fraction), nowB = after(b, fraction);
         const auto limit = float(approach * (1 - fraction) + tolerance);
         const BodyDistance separation = distance(nowA, nowB, {.maxDistance = limit}, &start);
         if (!separation.found) return {};
@@ -77,6 +100,13 @@ Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& optio
         fraction += (double(separation.distance) - 0.5 * tolerance) / approach;
     }
     return {};
+}
+
+Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options) {
+    const auto shapeOf = [](const Placed& body) {
+        return PlacedShape{ContactShape(body.collider), body.pose, body.scale, body.motion};
+    };
+    return timeOfImpact(shapeOf(a), shapeOf(b), options);
 }
 
 }  // namespace bilayer

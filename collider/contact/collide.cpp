@@ -119,9 +119,11 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
             [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };
     };
     const std::size_t first = contacts.size();
-    const ContactReport report = addContacts(a, b, options, contacts, visit(cache ? &cache->data().ofA : nullptr),
-                                             visit(cache ? &cache->data().ofB : nullptr));
+    CandidateLists* lists = cache ? &cache->data().candidates : nullptr;
+    const ContactReport report = addContacts(a, b, options, contacts, visit(lists ? &lists->ofA : nullptr),
+                                             visit(lists ? &lists->ofB : nullptr));
     if (options.exact) refineClosest(std::span(contacts).subspan(first), a, b);
+    if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);
     return report;
 }
 

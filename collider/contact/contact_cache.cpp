@@ -53,7 +53,7 @@ namespace bilayer {
 
 using namespace detail;
 
-ContactCache::ContactCache() : data_(std::make_unique<CandidateLists>()) {}
+ContactCache::ContactCache() : data_(std::make_unique<ContactMemory>()) {}
 ContactCache::~ContactCache() = default;
 ContactCache::ContactCache(ContactCache&&) noexcept = default;
 ContactCache& ContactCache::operator=(ContactCache&&) noexcept = default;

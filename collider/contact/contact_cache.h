@@ -7,6 +7,8 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "collider/contact/contact_reduction.h"
+
 namespace bilayer::detail {
 
 /// Candidate lists: the surface points of two bodies that may touch the other body. A list is valid until the bodies
@@ -45,6 +47,12 @@ struct CandidateLists {
     };
 
     List ofA, ofB;
+};
+
+/// What a ContactCache holds.
+struct ContactMemory {
+    CandidateLists candidates;
+    ContactReduction reduction;
 };
 
 }  // namespace bilayer::detail

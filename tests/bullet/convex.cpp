@@ -1,5 +1,5 @@
 // Bullet's convex shapes by formula.
-#include "integration/bullet/detail/convex.h"
+#include "integration/bullet/detail/convex_shape.h"
 
 #include <LinearMath/btConvexHullComputer.h>
 #include <btBulletCollisionCommon.h>
@@ -22,7 +22,6 @@ using namespace bilayer;
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
-using bullet::detail::Convex;
 
 namespace {
 
@@ -75,11 +74,11 @@ TEST_CASE("Points near hulls are as far away as from the nearest of all their fa
         for (const glm::vec3& point : hull.points) shape.addPoint(bullet::detail::toBullet(point), false);
         shape.recalcLocalAabb();
         shape.setMargin(0);
-        const Convex convex(shape);
+        const Convex convex = convexOf(shape);
         const Mesh faces = hullOf(hull.points);
         for (int i = 0; i < 3000; ++i) {
             const glm::vec3 point = float(random(0.01, 3)) * random.direction();
-            const bullet::detail::NearestPoint near = convex.nearest(point, std::numeric_limits<float>::max());
+            const NearestPoint near = convex.nearest(point, std::numeric_limits<float>::max());
             CAPTURE(i, point.x, point.y, point.z);
             REQUIRE(std::abs(near.distance) == Approx(test::distance(faces, glm::dvec3(point))).margin(2e-6));
             REQUIRE(glm::distance(near.core + near.distance * near.normal, point) < 4e-6f);
@@ -95,7 +94,7 @@ TEST_CASE("A point next to a face has the face's normal at any distance") {
     const auto check = [&](const Convex& convex, const glm::vec3& place, const glm::vec3& normal,
                            bool isOnRim = false) {
         for (const float height : {1e-9f, 1e-8f, 1e-7f, 1e-6f, 1e-5f, 1e-3f}) {
-            const bullet::detail::NearestPoint near = convex.nearest(place + height * normal, 1);
+            const NearestPoint near = convex.nearest(place + height * normal, 1);
             CAPTURE(height, place.x, place.y, place.z, near.normal.x, near.normal.y, near.normal.z);
             REQUIRE(near.distance == Approx(height).margin(1e-6));
             // on a rim a point within rounding of the side counts as on it too
@@ -107,7 +106,7 @@ TEST_CASE("A point next to a face has the face's normal at any distance") {
     for (const glm::vec3& point : points) hull.addPoint(bullet::detail::toBullet(point), false);
     hull.recalcLocalAabb();
     hull.setMargin(0);
-    const Convex ofPoints(hull);
+    const Convex ofPoints = convexOf(hull);
     const Mesh faces = hullOf(points);
     for (const glm::uvec3& t : faces.triangles) {
         const glm::vec3 &p = faces.points[t.x], &q = faces.points[t.y], &r = faces.points[t.z];
@@ -121,7 +120,7 @@ TEST_CASE("A point next to a face has the face's normal at any distance") {
     btCylinderShape cylinder({radius, half, radius});
     btConeShape cone(radius, 2 * half);
     cone.setMargin(0);
-    const Convex round(cylinder), pointed(cone);
+    const Convex round = convexOf(cylinder), pointed = convexOf(cone);
     for (int i = 0; i < 1000; ++i) {
         const float angle = float(random(0, 6.2831)), way = i % 4 ? radius * float(random(0, 1)) : radius;
         const glm::vec3 out(std::cos(angle), 0, std::sin(angle));
@@ -156,7 +155,7 @@ TEST_CASE("Straight paths enter convex shapes where the distance is zero, and on
     for (const btConvexShape* shape :
          std::initializer_list<btConvexShape*>{&hull, &box, &ball, &capsule, &cylinder, &cone, &balls}) {
         CAPTURE(shape->getName());
-        const Convex convex(*shape);
+        const Convex convex = convexOf(*shape);
         for (int i = 0; i < 1000; ++i) {
             const glm::vec3 start = float(random(0, 2.5)) * random.direction(),
                             way = float(random(0, 4)) * random.direction();
@@ -190,7 +189,7 @@ TEST_CASE("Nothing is inside of a flat hull, and paths next to it do not enter i
     quad.triangles = {{0, 1, 2}, {0, 2, 3}};
     shape.recalcLocalAabb();
     shape.setMargin(0);
-    const Convex convex(shape);  // Bullet rounds its vertices to 1e-4 of its size
+    const Convex convex = convexOf(shape);  // Bullet rounds its vertices to 1e-4 of its size
     for (int i = 0; i < 2000; ++i) {
         const glm::vec3 point(float(random(-3, 3)), float(random(-3, 3)), i % 2 ? 0.f : float(random(-1, 1)));
         CAPTURE(i, point.x, point.y, point.z);

@@ -9,11 +9,13 @@
 #include <random>
 
 #include <bilayer/collider/contact.h>
+#include "collider/contact/convex.h"
+#include "collider/contact/narrow_phase.h"
 #include "demos/shared/exact_distance.h"
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/convex.h"
-#include "integration/bullet/detail/narrow_phase.h"
+#include "integration/bullet/detail/convex_shape.h"
+#include "integration/bullet/detail/triangle_sheet.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -23,7 +25,6 @@ using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
-using bullet::detail::Convex;
 
 namespace {
 
@@ -66,7 +67,7 @@ Collide collideBars(int kind, ContactAccuracy measure) {
         return [=](const Crossing& c, float margin) {
             std::vector<Contact> contacts;
             ContactCache near;
-            bullet::detail::collideFields({*field, c.upper}, {*field, c.lower}, margin, false, near, contacts);
+            collide({*field, c.upper}, {*field, c.lower}, {.margin = margin}, contacts, &near);
             return contacts;
         };
     if (kind == 1 || kind == 2) {
@@ -79,15 +80,14 @@ Collide collideBars(int kind, ContactAccuracy measure) {
         }
         return [=](const Crossing& c, float margin) {
             std::vector<Contact> contacts;
-            bullet::detail::collideConvex(Convex(*shape), c.upper, {}, {*field, c.lower}, margin, false, contacts);
+            collideConvex(convexOf(*shape), c.upper, {}, {*field, c.lower}, {.margin = margin}, contacts);
             return contacts;
         };
     }
     const auto triangles = std::make_shared<TriangleShape>(shapes::box(bar));
     return [=](const Crossing& c, float margin) {
         std::vector<Contact> contacts;
-        bullet::detail::collideTriangles(*triangles->shape, transformOf(c.upper), {}, {*field, c.lower}, margin, false,
-                                         contacts);
+        collideTriangles(sheetOf(*triangles->shape), c.upper, {}, {*field, c.lower}, {.margin = margin}, contacts);
         return contacts;
     };
 }
@@ -146,13 +146,13 @@ TEST_CASE("Edge descent finds a bump between its samples, and keeps it") {
     const float side = std::sqrt(2.f) * halfBar;
     const glm::quat ridge = glm::angleAxis(glm::quarter_pi<float>(), glm::vec3(1, 0, 0));
     const btBoxShape box(bullet::detail::toBullet(bar));
-    const Convex convex(box);
+    const Convex convex = convexOf(box);
     float before = 0;
     for (int i = 0; i < 200; ++i) {
         const float displacement = 0.02f * h * float(i), gap = -0.1f * h;
         std::vector<Contact> contacts;
-        bullet::detail::collideConvex(convex, {{0.3f + displacement, 0, radius + side + gap}, ridge}, {}, {*ball, {}},
-                                      h, false, contacts);
+        collideConvex(convex, {{0.3f + displacement, 0, radius + side + gap}, ridge}, {}, {*ball, {}}, {.margin = h},
+                      contacts);
         const Contact& contact = deepest(contacts);
         CAPTURE(i, contact.distance / h);
         CHECK(contact.distance == Approx(gap).margin(tolerance));
@@ -165,7 +165,7 @@ TEST_CASE("Edge descent finds a bump between its samples, and keeps it") {
 
 TEST_CASE("Contacts of solids of revolution are finite in all orientations") {
     const auto plate = exactBox({1.2f, 1.2f, 0.1f}, h);
-    const Convex cylinder(btCylinderShape({0.15f, 0.1f, 0.15f})), cone(btConeShape(0.12f, 0.3f));
+    const Convex cylinder = convexOf(btCylinderShape({0.15f, 0.1f, 0.15f})), cone = convexOf(btConeShape(0.12f, 0.3f));
     // an orientation where the lowest point of a rim is also that of a side
     const glm::quat oblique(-0.3470952f, -0.3281656f, 0.4082684f, 0.7779134f);
     const unsigned start = seed();
@@ -178,8 +178,8 @@ TEST_CASE("Contacts of solids of revolution are finite in all orientations") {
         const glm::vec3 at(0.29426688f + 2e-4f * part(random), 0.296223223f,
                            isPlace ? 0.263574898f : 0.25f + 0.05f * part(random));
         std::vector<Contact> contacts;
-        bullet::detail::collideConvex(isPlace || i % 4 ? cylinder : cone, {at, isPlace ? oblique : glm::normalize(any)},
-                                      {}, {*plate, {}}, h, false, contacts);
+        collideConvex(isPlace || i % 4 ? cylinder : cone, {at, isPlace ? oblique : glm::normalize(any)}, {},
+                      {*plate, {}}, {.margin = h}, contacts);
         for (const Contact& contact : contacts) {
             CAPTURE(start, i, contact.distance, contact.feature);
             REQUIRE(glm::length(contact.normal) == Approx(1).margin(1e-4));
@@ -256,7 +256,7 @@ TEST_CASE("No contact is much deeper than the penetration depth of the bodies, w
     const TriangleShape triangles[] = {TriangleShape(meshes[0]), TriangleShape(meshes[1]), TriangleShape(meshes[2])};
     // the plank also as Bullet's box
     const btBoxShape plank({0.9f, 0.1f, 0.1f});
-    const Convex convex(plank);
+    const Convex convex = convexOf(plank);
     int overlapping = 0;
     for (int run = 0; run < 200; ++run) {
         const std::size_t a = random() % 3, b = random() % 3;
@@ -282,18 +282,15 @@ TEST_CASE("No contact is much deeper than the penetration depth of the bodies, w
         };
         std::vector<Contact> contacts;
         ContactCache points;
-        bullet::detail::collideFields({*colliders[a], pose}, {*colliders[b], {}}, h, false, points, contacts);
+        collide({*colliders[a], pose}, {*colliders[b], {}}, {.margin = h}, contacts, &points);
         check("fields", contacts);
         // as triangles: B collides with A
         contacts.clear();
-        bullet::detail::collideTriangles(
-            *triangles[a].shape,
-            btTransform(bullet::detail::toBullet(pose.rotation), bullet::detail::toBullet(pose.position)), {},
-            {*colliders[b], {}}, h, false, contacts);
+        collideTriangles(sheetOf(*triangles[a].shape), pose, {}, {*colliders[b], {}}, {.margin = h}, contacts);
         check("triangles", contacts);
         if (a != 2) continue;
         contacts.clear();
-        bullet::detail::collideConvex(convex, pose, {}, {*colliders[b], {}}, h, false, contacts);
+        collideConvex(convex, pose, {}, {*colliders[b], {}}, {.margin = h}, contacts);
         check("convex", contacts);
     }
     CHECK(overlapping > 150);
@@ -307,7 +304,7 @@ TEST_CASE("Exact contacts are exact against Bullet's shapes too") {
                sampled = deepCollider(shapes::box(half), h, ContactAccuracy::samples);
     const float radius = 0.1f * h;
     btSphereShape ball(radius);
-    const Convex convex(ball);
+    const Convex convex = convexOf(ball);
     float worstSampled = 0;
     for (int i = 0; i < 40; ++i) {
         const float angle = glm::half_pi<float>() * (float(i) + 0.5f) / 40;
@@ -315,7 +312,7 @@ TEST_CASE("Exact contacts are exact against Bullet's shapes too") {
         const Pose pose{glm::vec3(half.x, half.y, 0.013f * float(i - 20)) + away, {1, 0, 0, 0}};
         const auto errorOf = [&](const Collider& collider) {
             std::vector<Contact> contacts;
-            bullet::detail::collideConvex(convex, pose, {}, {collider, {}}, h, false, contacts);
+            collideConvex(convex, pose, {}, {collider, {}}, {.margin = h}, contacts);
             // measures the ball's own centre in the field, not the box's edge in the ball
             float error = h;
             for (const Contact& contact : contacts)

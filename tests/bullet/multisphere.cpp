@@ -9,11 +9,11 @@
 #include <random>
 
 #include <bilayer/collider/contact.h>
+#include "collider/contact/multisphere.h"
+#include "collider/contact/narrow_phase.h"
 #include "demos/shared/exact_distance.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/convex.h"
-#include "integration/bullet/detail/multisphere.h"
-#include "integration/bullet/detail/narrow_phase.h"
+#include "integration/bullet/detail/convex_shape.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -22,8 +22,6 @@ using namespace bilayer;
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
-using bullet::detail::Convex;
-using bullet::detail::MultisphereHull;
 
 namespace {
 
@@ -83,7 +81,7 @@ TEST_CASE("The surface of a multisphere is that of its balls at any margin and s
                                  scale * btVector3(0, 0.3f, 0)};
     const float radii[] = {scale * 0.25f, scale * 0.2f, scale * 0.15f};
     const btMultiSphereShape spheres(centres, radii, 3);
-    const Convex convex(spheres);
+    const Convex convex = convexOf(spheres);
     for (int i = 0; i < 3; ++i) {
         const glm::vec3 above = bullet::detail::toGlm(centres[i]) + glm::vec3(0, 0, scale);
         CHECK(convex.nearest(above, scale).distance <= Approx(scale - radii[i]));
@@ -114,7 +112,7 @@ TEST_CASE("Balls rest in a groove at the depth of its two faces") {
         btSphereShape ball(radius);
         std::vector<Contact> contacts;
         const Pose lying{bottom + glm::vec3(0, 0, std::sqrt(2.f) * radius)};
-        bullet::detail::collideConvex(Convex(ball), lying, {}, {*groove, {}}, h, false, contacts);
+        collideConvex(convexOf(ball), lying, {}, {*groove, {}}, {.margin = h}, contacts);
         return deepest(contacts).distance;
     };
     for (const float voxels : {0.9f, 1.5f, 2.f}) {

@@ -9,8 +9,9 @@
 #include <random>
 
 #include <bilayer/collider/contact.h>
+#include "collider/contact/narrow_phase.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/detail/narrow_phase.h"
+#include "integration/bullet/detail/triangle_sheet.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -47,8 +48,7 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
         pose.position.z = halfSlab.z - lowest + 0.5f * h * part(random);
         const auto collide = [&](const TriangleShape& slab) {
             std::vector<Contact> contacts;
-            bullet::detail::collideTriangles(*slab.shape, btTransform::getIdentity(), {}, {*body, pose}, h, false,
-                                             contacts);
+            collideTriangles(bullet::detail::sheetOf(*slab.shape), {}, {}, {*body, pose}, {.margin = h}, contacts);
             return contacts;
         };
         const auto few = collide(two), others = collide(many);
@@ -97,7 +97,7 @@ TEST_CASE("A corner has the same depth below triangles as below their plane, in 
                               (pose.rotation * (half * glm::vec3(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1))).z);
         pose.position.z = -lowest - depth;
         std::vector<Contact> contacts;
-        bullet::detail::collideTriangles(ground, btTransform::getIdentity(), {}, {*box, pose}, h, false, contacts);
+        collideTriangles(bullet::detail::sheetOf(ground), {}, {}, {*box, pose}, {.margin = h}, contacts);
         float deepest = h;
         glm::vec3 direction(0);
         for (const Contact& contact : contacts)
@@ -126,8 +126,8 @@ TEST_CASE("A vertex below a crease of triangles has the depths of both faces") {
         const glm::vec3 axis = glm::normalize(glm::vec3(0.3f * any(random), 0.3f * any(random), -1));
         const glm::quat rotation = glm::angleAxis(std::acos(axis.z), glm::normalize(glm::vec3(-axis.y, axis.x, 0)));
         std::vector<Contact> contacts;
-        bullet::detail::collideTriangles(*groove.shape, btTransform::getIdentity(), {},
-                                         {*cone, {tip - 0.5f * height * axis, rotation}}, h, false, contacts);
+        collideTriangles(bullet::detail::sheetOf(*groove.shape), {}, {},
+                         {*cone, {tip - 0.5f * height * axis, rotation}}, {.margin = h}, contacts);
         for (const glm::vec3& up : {left, right}) {
             float deepest = h;
             for (const Contact& contact : contacts)

@@ -11,8 +11,9 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
+#include "collider/contact/narrow_phase.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/detail/narrow_phase.h"
+#include "integration/bullet/detail/triangle_sheet.h"
 #include "world.h"
 
 using namespace bilayer;
@@ -190,8 +191,8 @@ TEST_CASE("A field comes to rest on uneven ground, where each contact has a feat
     CHECK_FALSE(body->isActive());
 
     std::vector<Contact> contacts;
-    bullet::detail::collideTriangles(waves.shape(asTerrain), btTransform::getIdentity(), {},
-                                     shape.placed(body->getWorldTransform()), h, false, contacts);
+    collideTriangles(bullet::detail::sheetOf(waves.shape(asTerrain)), {}, {}, shape.placed(body->getWorldTransform()),
+                     {.margin = h}, contacts);
     std::set<std::uint32_t> features;
     for (const Contact& contact : contacts) features.insert(contact.feature);
     CHECK(features.size() == contacts.size());

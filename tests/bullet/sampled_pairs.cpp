@@ -10,9 +10,9 @@
 #include <bilayer/cl/point_sampler.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
+#include "collider/contact/narrow_phase.h"
 #include "collider/contact/sampled_contacts.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/detail/narrow_phase.h"
 #include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"

@@ -190,7 +190,7 @@ Manifolds::~Manifolds() {
     for (btPersistentManifold* manifold : manifolds_) dispatcher_.releaseManifold(manifold);
 }
 
-void Manifolds::write(std::span<const Patch> patches, std::span<const ContactDetails> details,
+void Manifolds::write(std::span<const ContactPatch> patches, std::span<const ContactDetails> details,
                       const btCollisionObject& a, const btCollisionObject& b, float seconds,
                       const Continuity& continuity, btManifoldResult& result) {
     // At least one manifold: users expect one for a pair that overlaps.

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "integration/bullet/detail/contact_reduction.h"
+#include "collider/contact/contact_reduction.h"
 #include "integration/bullet/detail/triangle_ids.h"
 
 namespace bilayer::bullet::detail {
@@ -61,8 +61,9 @@ class Manifolds {
     /// @param details  one for each contact of the patches
     /// @param a, b     the bodies A and B of the patches; `result` may hold them in either order, as within a compound
     /// @param seconds  duration of the step [s]; 0 between steps
-    void write(std::span<const Patch> patches, std::span<const ContactDetails> details, const btCollisionObject& a,
-               const btCollisionObject& b, float seconds, const Continuity& continuity, btManifoldResult& result);
+    void write(std::span<const ContactPatch> patches, std::span<const ContactDetails> details,
+               const btCollisionObject& a, const btCollisionObject& b, float seconds, const Continuity& continuity,
+               btManifoldResult& result);
 
     std::span<btPersistentManifold* const> all() const { return manifolds_; }
 

@@ -7,10 +7,11 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/shape.h>
+#include "collider/contact/edge_probes.h"
+#include "collider/contact/narrow_phase.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/edge_probes.h"
-#include "integration/bullet/detail/narrow_phase.h"
 #include "integration/bullet/detail/predicted_contacts.h"
+#include "integration/bullet/detail/triangle_sheet.h"
 #include "integration/bullet/detail/velocity.h"
 
 namespace bilayer::bullet::detail {
@@ -70,7 +71,8 @@ void Pair::collide(const Side& a, const Side& b) {
 
 void Pair::collide(const Side& a, const Side& b, const SampledPairs& sampled, std::size_t index) {
     contacts_.clear();
-    report_ = collideFields(a.placed(), b.placed(), marginOf(a, b), sampled.ofA(index), sampled.ofB(index), contacts_);
+    report_ = collideFound(a.placed(), b.placed(), {.margin = marginOf(a, b)}, sampled.ofA(index), sampled.ofB(index),
+                           contacts_);
     finish(a, b);
     ++sampled_;
 }
@@ -95,7 +97,7 @@ void Pair::commit(const btCollisionObject& a, const btCollisionObject& b, float 
     manifolds_.write(reduced.patches, details_, a, b, seconds, continuity_, result);
     ++statistics_.pairs;
     statistics_.contactsFound += found_;
-    for (const Patch& patch : reduced.patches) statistics_.contactsKept += patch.count;
+    for (const ContactPatch& patch : reduced.patches) statistics_.contactsKept += patch.count;
     statistics_.reductionError = std::max(statistics_.reductionError, reduced.reductionError);
     statistics_.beyondBand += static_cast<int>(report_.beyondBand);
     statistics_.sampled += sampled_;
@@ -111,17 +113,26 @@ float Pair::nearest() const {
 void Pair::find(const Side& a, const Side& b, float margin, bool exact) {
     contacts_.clear();
     const bool follows = static_cast<const Shape&>(*b.shape).speculative();
-    report_ = isField(*a.shape) ? collideFields(a.placed(), b.placed(), margin, exact, cache_, contacts_)
-                                : collideOther(a, b.placed(), margin, exact, follows ? a.motion() : Motion{});
+    ContactOptions options{.margin = margin, .exact = exact};
+    if (!isField(*a.shape)) {
+        report_ = collideOther(a, b.placed(), options, follows ? a.motion() : Motion{});
+        return;
+    }
+    // a contact test needs the distance of the bodies for any direction of their normals
+    if (exact) {
+        options.minNormalCosineApart = options.minNormalCosine;
+        options.keepsObliqueEdges = true;
+    }
+    report_ = bilayer::collide(a.placed(), b.placed(), options, contacts_, &cache_);
 }
 
 void Pair::finish(const Side& a, const Side& b) {
     found_ = static_cast<int>(contacts_.size());
-    reduction_.update(contacts_, a.transform, b.transform);
+    reduction_.update(contacts_, toPose(a.transform), toPose(b.transform));
     continuity_ = continuityOf(a, b);
     details_.clear();
     const PredictedContacts predictions(a, b, continuity_);
-    for (const Patch& patch : reduction_.reduced().patches)
+    for (const ContactPatch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i)
             details_.push_back({predictions.predict(patch.contacts[i]), std::nullopt});
     if (hasTriangles(*a.shape)) nameTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());
@@ -131,7 +142,7 @@ void Pair::finish(const Side& a, const Side& b) {
 
 void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field) {
     std::vector<MeshPlace> places;
-    for (const Patch& patch : reduction_.reduced().patches)
+    for (const ContactPatch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i) {
             const Contact& contact = patch.contacts[i];
             places.push_back(
@@ -143,21 +154,22 @@ void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transfor
     for (std::size_t i = 0; i < details_.size(); ++i) details_[i].triangle = triangles[i];
 }
 
-ContactReport Pair::collideOther(const Side& a, const Placed& field, float margin, bool exact, const Motion& motion) {
+ContactReport Pair::collideOther(const Side& a, const Placed& field, const ContactOptions& options,
+                                 const Motion& motion) {
     if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
         const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
         const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
         const float offset = plane.getPlaneConstant() + normal.dot(a.transform.getOrigin());
         const Motion planeMotion = motion.about(toGlm(a.transform.getOrigin()), glm::vec3(0));
-        return collidePlane(toGlm(normal), offset, planeMotion, field, margin, exact, contacts_);
+        return collideHalfSpace({toGlm(normal), offset}, planeMotion, field, options, contacts_);
     }
     if (a.shape->isConvex()) {
         const auto& convex = static_cast<const btConvexShape&>(*a.shape);
         if (!convex_ || !convex_->represents(convex)) convex_.emplace(convex);
-        return collideConvex(*convex_, toPose(a.transform), motion, field, margin, exact, contacts_);
+        return collideConvex(convex_->convex(), toPose(a.transform), motion, field, options, contacts_);
     }
-    return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin, exact,
-                            contacts_);
+    const TriangleSheet sheet = sheetOf(static_cast<const btConcaveShape&>(*a.shape));
+    return collideTriangles(sheet, toPose(a.transform), motion, field, options, contacts_);
 }
 
 }  // namespace bilayer::bullet::detail

@@ -11,9 +11,9 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/dispatcher.h>
-#include "integration/bullet/detail/convex.h"
+#include "collider/contact/sampled_pairs.h"
+#include "integration/bullet/detail/convex_shape.h"
 #include "integration/bullet/detail/manifolds.h"
-#include "integration/bullet/detail/sampled_pairs.h"
 
 namespace bilayer::bullet::detail {
 
@@ -73,14 +73,14 @@ class Pair {
   private:
     float nearest() const;
     void find(const Side& a, const Side& b, float margin, bool exact);
-    ContactReport collideOther(const Side& a, const Placed& field, float margin, bool exact, const Motion& motion);
+    ContactReport collideOther(const Side& a, const Placed& field, const ContactOptions& options, const Motion& motion);
     void finish(const Side& a, const Side& b);
     void nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field);
 
     Manifolds manifolds_;
     DispatchStatistics& statistics_;
-    std::optional<Convex> convex_;  ///< of A
-    ContactCache cache_;            ///< of two fields
+    std::optional<ConvexShape> convex_;  ///< of A
+    ContactCache cache_;                 ///< of two fields
     std::vector<Contact> contacts_;
     ContactReduction reduction_;
     Continuity continuity_;

@@ -15,7 +15,7 @@
 #include <optional>
 
 #include <bilayer/collider/field.h>
-#include "integration/bullet/detail/convex.h"
+#include "collider/contact/convex.h"
 
 namespace bilayer::bullet::detail {
 

@@ -13,11 +13,12 @@
 #include <type_traits>
 #include <vector>
 
+#include "collider/contact/edge_probes.h"
+#include "collider/contact/open_surface.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/convex.h"
-#include "integration/bullet/detail/edge_probes.h"
-#include "integration/bullet/detail/open_surface.h"
+#include "integration/bullet/detail/convex_shape.h"
 #include "integration/bullet/detail/surfaces.h"
+#include "integration/bullet/detail/triangle_sheet.h"
 
 namespace bilayer::bullet::detail {
 
@@ -227,7 +228,7 @@ Impact firstImpact(const btConcaveShape& mesh, const Shape& field, const std::ve
     std::vector<glm::vec3> path;
     for (const StepTransform& transform : intoMesh) path.push_back(transform(bounds.centre()));
     const float radius = 0.5f * field.scale() * glm::length(bounds.size());
-    const SharpFeatures sharp = sharpFeaturesOf(trianglesAlong(mesh, path, radius));
+    const SharpFeatures sharp = sharpFeaturesOf(trianglesAlong(sheetOf(mesh), path, radius));
     const FieldSurface surface(field.collider().field());
     PointSweep sweep(surface, transforms, field.voxelSize() / field.scale());
     for (const SharpFeatures::OutwardVertex& vertex : sharp.vertices) sweep.follow({vertex.place, vertex.outward});
@@ -254,7 +255,7 @@ Impact timeOfImpact(const LeafShape& fieldShape, const BodySweep& fieldSweep, co
     if (type == STATIC_PLANE_PROXYTYPE)
         return into(PlaneSurface(static_cast<const btStaticPlaneShape&>(*other.shape)), voxel);
     if (other.shape->isConvex()) {
-        const Convex convex(static_cast<const btConvexShape&>(*other.shape));
+        const Convex convex = convexOf(static_cast<const btConvexShape&>(*other.shape));
         const Impact impact = firstImpact(convex, field, stepTransforms(other, otherSweep, fieldShape, fieldSweep));
         return earlier(into(ConvexSurface(convex, 0.1f * allowedDepth * voxel), voxel),
                        inWorld(impact, fieldShape, fieldSweep).reversed());

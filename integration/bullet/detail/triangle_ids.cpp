@@ -7,10 +7,12 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "collider/contact/nearest_on_triangle.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/triangle_distance.h"
 
 namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
 
 namespace {
 

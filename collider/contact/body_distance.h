@@ -1,0 +1,34 @@
+// Parts of the answers of distance().
+// Tested by tests/collider/distance.cpp and tests/collider/shape_distance.cpp.
+#pragma once
+
+#include <glm/gtc/quaternion.hpp>
+#include <utility>
+
+#include <bilayer/collider/distance.h>
+#include "collider/contact/mesh_distance.h"
+#include "collider/contact/triangle_distance.h"
+
+namespace bilayer::detail {
+
+/// Maps coordinates of a body to the world.
+inline Similarity toWorld(const Pose& pose, float scale) {
+    return {glm::mat3_cast(glm::normalize(glm::dquat(pose.rotation))), double(scale), glm::dvec3(pose.position)};
+}
+
+inline WitnessPoint witness(const Similarity& toWorld, const TrianglePoint& point, std::uint32_t triangle) {
+    return {toWorld(point.position), triangle, point.feature, point.index};
+}
+
+/// The same answer with the bodies in the other order.
+inline BodyDistance swapped(BodyDistance answer) {
+    std::swap(answer.a, answer.b);
+    answer.normal = -answer.normal;
+    if (answer.overlap == Overlap::aInsideB)
+        answer.overlap = Overlap::bInsideA;
+    else if (answer.overlap == Overlap::bInsideA)
+        answer.overlap = Overlap::aInsideB;
+    return answer;
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,58 @@
+// The convex hull of spheres, which is what Bullet's multispheres are. Its surface consists of spheres, cones tangent
+// to two of them, and planes tangent to three.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <utility>
+#include <vector>
+
+#include "collider/contact/nearest_point.h"
+
+namespace bilayer::detail {
+
+class MultisphereHull {
+  public:
+    struct Sphere {
+        glm::vec3 centre;  ///< [m]
+        float radius;      ///< not negative [m]
+    };
+
+    MultisphereHull() = default;
+    /// Takes at least one sphere. Takes O(n^4) time for n of them.
+    explicit MultisphereHull(std::vector<Sphere> spheres);
+
+    /// The nearest point of the surface. Its core point is the centre of a sphere inside the hull that touches the
+    /// surface there. Exact up to rounding, outside and inside. Takes O(n^2) outside, O(n^3) inside.
+    NearestPoint nearest(const glm::vec3& point) const;
+
+    /// The spheres that no other one contains.
+    const std::vector<Sphere>& spheres() const { return spheres_; }
+    /// Pairs of spheres with a tangent cone; some cones may be inside the hull.
+    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs() const { return pairs_; }
+
+  private:
+    struct TangentPlane {
+        glm::dvec3 normal;
+        double offset;
+        std::uint32_t corners[3];
+    };
+    // In double precision: where the distances to a sphere and to a cone differ by rounding only, their normals differ
+    // by the square root of that.
+    struct Candidate {
+        double distance;
+        glm::dvec3 normal, centre;
+        double radius;
+    };
+    void addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k);
+    Candidate aroundSphere(const Sphere& sphere, const glm::dvec3& point) const;
+    Candidate aroundPair(const Sphere& from, const Sphere& to, const glm::dvec3& point) const;
+    Candidate inside(const glm::dvec3& point) const;
+    double along(const glm::dvec3& direction, const glm::dvec3& point) const;
+
+    std::vector<Sphere> spheres_;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+    std::vector<TangentPlane> planes_;
+    float size_ = 0, minRadius_ = 0;  ///< [m]
+};
+
+}  // namespace bilayer::detail

@@ -1,0 +1,16 @@
+// The nearest point of a convex shape's surface.
+// Tested by tests/bullet/convex.cpp.
+#pragma once
+
+#include <glm/vec3.hpp>
+
+namespace bilayer::detail {
+
+struct NearestPoint {
+    float distance;    ///< signed, to the surface [m]
+    glm::vec3 normal;  ///< outward normal of the surface there, of unit length
+    glm::vec3 core;    ///< nearest point of the shape's core: the surface there is that of a sphere around it
+    float radius;      ///< of that sphere: growth of the core there [m]
+};
+
+}  // namespace bilayer::detail

@@ -1,0 +1,47 @@
+#include "collider/contact/sampled_pairs.h"
+#include <bilayer/collider/contact.h>
+#include "collider/contact/sampled_contacts.h"
+
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <exception>
+
+namespace bilayer::detail {
+
+void SampledPairs::clear() {
+    bodies_.clear();
+    places_.clear();
+    queries_.clear();
+}
+
+std::uint32_t SampledPairs::placeOf(const Collider& collider) {
+    const auto [place, isNew] = places_.emplace(collider.id(), std::uint32_t(bodies_.size()));
+    if (isNew) bodies_.push_back(sampledBody(collider));
+    return place->second;
+}
+
+std::optional<std::size_t> SampledPairs::add(const Placed& a, const Placed& b, float margin) {
+    auto ofA = pointQuery(a, b, margin), ofB = pointQuery(b, a, margin);
+    if (!works() || !ofA || !ofB) return std::nullopt;
+    ofA->body = ofB->other = placeOf(a.collider);
+    ofA->other = ofB->body = placeOf(b.collider);
+    queries_.push_back(*ofA);
+    queries_.push_back(*ofB);
+    return size() - 1;
+}
+
+bool SampledPairs::sample() {
+    if (queries_.empty()) return true;
+    try {
+        sampler_.sample(bodies_, queries_, found_);
+        return true;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "bilayer: contacts are found by the processor from now on, not by {}: {}\n", sampler_.device,
+                   error.what());
+        sampler_ = {};
+        return false;
+    }
+}
+
+}  // namespace bilayer::detail

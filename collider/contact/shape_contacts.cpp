@@ -1,0 +1,99 @@
+// Contacts between two shapes, one of them a collider.
+// Tested by tests/collider/shapes.cpp.
+#include <bilayer/collider/contact.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <stdexcept>
+#include <variant>
+
+#include "collider/contact/contact_reduction.h"
+#include "collider/contact/narrow_phase.h"
+#include "collider/contact/placed_shapes.h"
+#include "collider/contact/shape_data.h"
+
+namespace bilayer {
+
+using namespace detail;
+
+namespace {
+
+/// The world in units of a length.
+struct Units {
+    float length;
+
+    Pose into(const Pose& pose) const { return {pose.position / length, pose.rotation}; }
+    Motion into(const Motion& motion) const { return {motion.displacement / length, motion.rotation}; }
+    Placed into(const Placed& body) const {
+        return {body.collider, into(body.pose), body.scale / length, into(body.motion)};
+    }
+};
+
+HalfSpace inWorld(const HalfSpace& solid, const Pose& pose) {
+    const glm::vec3 normal = pose.rotation * solid.normal;
+    return {normal, solid.offset + glm::dot(normal, pose.position)};
+}
+
+/// Adds the contacts of another shape A with the field B. They are found in units of the shape's scale, in which the
+/// shape has its own size.
+ContactReport collideField(const PlacedShape& a, const Placed& b, ContactOptions options,
+                           std::vector<Contact>& contacts) {
+    const Units units{a.scale};
+    const Placed field = units.into(b);
+    const Pose pose = units.into(a.pose);
+    const Motion motion = units.into(a.motion);
+    options.margin /= units.length;
+    const std::size_t first = contacts.size();
+    ContactReport report;
+    const auto& shape = a.shape.data().shape;
+    if (const auto* convex = std::get_if<Convex>(&shape))
+        report = collideConvex(*convex, pose, motion, field, options, contacts);
+    else if (const auto* solid = std::get_if<HalfSpace>(&shape))
+        report = collideHalfSpace(inWorld(*solid, pose), motion.about(pose.position, glm::vec3(0)), field, options,
+                                  contacts);
+    else
+        report = collideTriangles(std::get<TriangleSheet>(shape), pose, motion, field, options, contacts);
+    for (std::size_t i = first; i < contacts.size(); ++i) {
+        Contact& contact = contacts[i];
+        contact.position *= units.length;
+        contact.distance *= units.length;
+        contact.approach *= units.length;
+        if (contact.turningRadius > 0) contact.turningRadius *= units.length;
+    }
+    return report;
+}
+
+/// The contact as seen with the bodies in the other order.
+Contact swapped(Contact contact) {
+    contact.position += contact.distance * contact.normal;
+    contact.normal = -contact.normal;
+    contact.feature ^= featureOfB;
+    return contact;
+}
+
+}  // namespace
+
+Order detail::orderOf(const PlacedShape& a, const PlacedShape& b) {
+    for (const PlacedShape* body : {&a, &b})
+        if (!(body->scale > 0) || !std::isfinite(body->scale))
+            throw std::invalid_argument("the scale of a shape must be positive and finite");
+    const bool isA = a.shape.collider(), isB = b.shape.collider();
+    if (!isA && !isB) throw std::invalid_argument("one of two shapes must be a collider, whose field is asked");
+    return {isA && isB, isA};
+}
+
+ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactOptions& options,
+                      std::vector<Contact>& contacts, ContactCache* cache) {
+    const Order order = orderOf(a, b);
+    if (order.both) return collide(placed(a), placed(b), options, contacts, cache);
+    const std::size_t first = contacts.size();
+    const ContactReport report =
+        order.isSwapped ? collideField(b, placed(a), options, contacts) : collideField(a, placed(b), options, contacts);
+    if (order.isSwapped)
+        for (std::size_t i = first; i < contacts.size(); ++i) contacts[i] = swapped(contacts[i]);
+    if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);
+    return report;
+}
+
+}  // namespace bilayer

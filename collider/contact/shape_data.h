@@ -1,0 +1,25 @@
+// The data of a ContactShape.
+// Tested by tests/collider/shapes.cpp.
+#pragma once
+
+#include <bilayer/collider/collider.h>
+#include <bilayer/collider/shapes.h>
+
+#include <glm/vec3.hpp>
+#include <variant>
+
+#include "collider/contact/convex.h"
+
+namespace bilayer::detail {
+
+/// The half-space of all x with dot(normal, x) <= offset.
+struct HalfSpace {
+    glm::vec3 normal;  ///< of unit length
+    float offset;      ///< [m]
+};
+
+struct ContactShapeData {
+    std::variant<Collider, Convex, HalfSpace, TriangleSheet> shape;
+};
+
+}  // namespace bilayer::detail

@@ -1,0 +1,41 @@
+// The distance of a triangle mesh from convex solids and planes.
+// Tested by tests/collider/shape_distance.cpp.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
+
+#include "collider/contact/convex.h"
+#include "collider/contact/mesh_distance.h"
+#include "collider/contact/shape_data.h"
+#include "collider/contact/triangle_distance.h"
+#include "collider/field/mesh_tree.h"
+
+namespace bilayer::detail {
+
+/// The point of a mesh that is nearest to a solid, and the point of the solid nearest to it.
+struct SolidDistance {
+    std::uint32_t triangle = noTriangle;  ///< `noTriangle`: nothing within the limit
+    TrianglePoint onMesh;
+    glm::dvec3 onSolid{0};
+    double distance = std::numeric_limits<double>::infinity();
+
+    bool found() const { return triangle != noTriangle; }
+};
+
+/// All lengths are those of the mesh's coordinates. The distance is exact to 1e-6 of the sizes of both bodies.
+/// @param toMesh  maps coordinates of the solid to those of the mesh
+/// @param limit   finds nothing beyond this distance
+/// @param start   a triangle that may be near, or `noTriangle`
+/// The distance of a convex body; 0 if the surface of the mesh meets it, or lies in it.
+SolidDistance nearestTo(const Convex& convex, const MeshTree& mesh, const Similarity& toMesh, double limit,
+                        std::uint32_t start);
+/// The height of the lowest vertex over a plane, which may be negative.
+SolidDistance nearestTo(const HalfSpace& solid, const MeshTree& mesh, const Similarity& toMesh, double limit,
+                        std::uint32_t start);
+/// The distance of a triangle; 0 if the surface of the mesh meets it.
+SolidDistance nearestTo(const Triangle& triangle, const MeshTree& mesh, const Similarity& toMesh, double limit,
+                        std::uint32_t start);
+
+}  // namespace bilayer::detail
