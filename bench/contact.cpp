@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include <bilayer/cl/point_sampler.h>
+#include <bilayer/cl/field.h>
 #include "bench/measure.h"
 #include "bench/pile.h"
 #include "bench/program.h"

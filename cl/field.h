@@ -1,13 +1,17 @@
-// A field on an OpenCL device, for sampling many points at once; kernel in field.cl.
+// A field on an OpenCL device, for sampling many points at once; kernel in field.cl. And a sampler of the surface points
+// of bodies in the fields of other bodies, in one batch per step; kernel in point_sampler.cl.
+// Tested by tests/cl/field.cpp and tests/bullet/sampled_pairs.cpp.
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
 
 #include <bilayer/cl/device.h>
 #include <bilayer/cl/filler.h>
+#include <bilayer/collider/contact.h>
 #include <bilayer/collider/query.h>
 #include <bilayer/sdf/build.h>
 
@@ -50,5 +54,18 @@ class DeviceField {
     struct Data;
     std::shared_ptr<Data> data_;
 };
+
+/// A point sampler on a device, with its times.
+struct OpenclPointSampler : PointSampler {
+    std::function<OpenclTimes()> times;  ///< of all batches so far by this sampler and its copies
+};
+
+/// A point sampler on a device. Bodies are uploaded on first use, and stay. If the memory is full, all bodies are
+/// released except those of the current batch. Queries are uploaded, and their results downloaded; only one batch runs
+/// at a time.
+///
+/// Throws DeviceError, here and when it samples: for errors of the device, for a device without double precision, and
+/// if the memory is too small for the bodies of one batch. The text then states how many MiB are needed.
+OpenclPointSampler openclPointSampler(const Device& device, const OpenclOptions& options = {});
 
 }  // namespace bilayer

@@ -1,5 +1,5 @@
 // Buffers hold the bodies of all queries, concatenated, and grow with new bodies.
-#include <bilayer/cl/point_sampler.h>
+#include <bilayer/cl/field.h>
 #include <bilayer/collider/contact.h>
 
 #include <algorithm>

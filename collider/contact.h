@@ -145,7 +145,7 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
                       std::vector<Contact>& contacts, ContactCache* cache = nullptr);
 
 /// Samples the surface points of many bodies in each other's fields on a device. openclPointSampler() in
-/// cl/point_sampler.h makes one. Call it from one thread at a time.
+/// cl/field.h makes one. Call it from one thread at a time.
 struct PointSampler {
     std::string backend;  ///< "opencl"
     std::string device;   ///< name of the device

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include <bilayer/cl/point_sampler.h>
+#include <bilayer/cl/field.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
 #include "collider/contact/narrow_phase.h"

@@ -9,7 +9,7 @@
 
 #include <bilayer/cl/field.h>
 #include <bilayer/cl/filler.h>
-#include <bilayer/cl/point_sampler.h>
+#include <bilayer/cl/field.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
