@@ -108,6 +108,7 @@ class Convex {
     void listFacesAround();
     void measure();
 
+    bool isRounded(const NearestPoint& nearest) const;
     NearestPoint nearestOfSegment(const glm::vec3& point) const;
     NearestPoint nearestOfBox(const glm::vec3& point) const;
     NearestPoint nearestOfRevolution(const glm::vec3& point) const;

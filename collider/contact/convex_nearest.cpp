@@ -18,6 +18,8 @@ namespace {
 
 // A normal within this of the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
+// Normals within half a degree belong to one face (cosine).
+constexpr float sameNormal = 0.99996f;
 // Limit of steps in the search for the entry of a path; longer searches only graze.
 constexpr int maxSteps = 64;
 // From this fraction of the half height on, a point on the side is on a rim.
@@ -188,13 +190,20 @@ glm::vec3 Convex::supportNear(const NearestPoint& nearest, const glm::vec3& towa
 }
 
 bool Convex::isFlat(const NearestPoint& nearest) const {
-    return core_ == Core::box || core_ == Core::hull ||
+    return core_ == Core::box || (core_ == Core::hull && !isRounded(nearest)) ||
            (core_ == Core::revolution && std::abs(nearest.normal[axis_]) > 1 - flatEnd * flatEnd);
+}
+
+// On an edge or a vertex of a hull that is grown by a radius: its normal is no face's.
+bool Convex::isRounded(const NearestPoint& nearest) const {
+    return core_ == Core::hull && radius_ > 0 && std::none_of(faces_.begin(), faces_.end(), [&](const HullFace& face) {
+               return glm::dot(face.normal, nearest.normal) > sameNormal;
+           });
 }
 
 bool Convex::isRound(const NearestPoint& nearest) const {
     const bool isOnSide = std::abs(nearest.core[axis_]) < beforeRim * halfHeight_;
-    return core_ == Core::segment || core_ == Core::spheres ||
+    return core_ == Core::segment || core_ == Core::spheres || isRounded(nearest) ||
            (core_ == Core::revolution && isOnSide && std::abs(nearest.normal[axis_]) < 1 - flatEnd * flatEnd);
 }
 

@@ -51,7 +51,7 @@ void Simplex::add(const SimplexVertex& vertex) {
     double nearest2 = std::numeric_limits<double>::infinity();
     Simplex best;
     for (unsigned part = 1; part < 1u << count; ++part) {
-        std::array<glm::dvec3, 4> points;
+        std::array<glm::dvec3, 4> points{};
         Simplex candidate;
         for (std::size_t i = 0; i < count; ++i) {
             if (!(part >> i & 1)) continue;

@@ -15,15 +15,15 @@ namespace bilayer::detail {
 
 /// A vertex of the simplex: a difference of support points of two sets.
 struct SimplexVertex {
-    glm::dvec3 ofA, ofB;
-    int cornerOfA;  ///< a number of the support point of A
+    glm::dvec3 ofA{0}, ofB{0};
+    int cornerOfA = 0;  ///< a number of the support point of A
 
     glm::dvec3 difference() const { return ofA - ofB; }
 };
 
 /// Up to four differences of support points, with weights: the weighted mean is their point nearest to the origin.
 struct Simplex {
-    std::array<SimplexVertex, 4> vertices;
+    std::array<SimplexVertex, 4> vertices{};
     std::array<double, 4> weights{};
     std::size_t count = 0;
 
