@@ -281,7 +281,7 @@ OpenclPointSampler openclPointSampler(const Device& device, const OpenclOptions&
         const std::lock_guard lock(*mutex);
         sum->add(sampler->sample(bodies, queries, answers));
     };
-    return {{"opencl", device.info().name, sample}, [sum] { return sum->get(); }};
+    return {PointSampler({"opencl", device.info().name, sample}), [sum] { return sum->get(); }};
 } catch (const cl::Error& error) {
     throw deviceError(error, device.info().name);
 }

@@ -8,6 +8,7 @@
 
 #include <bilayer/cl/filler.h>
 #include "cl/detail/program.h"
+#include "sdf/leaf/blocks.h"
 
 namespace bilayer::detail {
 

@@ -14,6 +14,7 @@
 #include "cl/detail/enqueue.h"
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/queue_guard.h"
+#include "sdf/grid/field_build.h"
 #include "sdf/leaf/band.h"
 #include "sdf/leaf/blocks.h"
 
