@@ -1,6 +1,6 @@
 // The methods that fill brick by brick on a device. Triangles are binned into bricks and cut into parts, and blocks are
 // filled from the parts. Bricks stream through the device's memory in batches.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <functional>

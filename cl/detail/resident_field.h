@@ -1,5 +1,5 @@
 // Builds a field that stays on a device; kernels in resident.cl.
-// Tested by tests/cl/field.cpp.
+// Tested by tests/cl/field.cpp through DeviceField.
 #pragma once
 
 #include <bilayer/sdf/build.h>

@@ -1,5 +1,5 @@
 // The transform from the coordinates of one body into those of another.
-// Tested by tests/collider/collide.cpp.
+// Tested by tests/collider/collide.cpp through collide().
 #pragma once
 
 #include <bilayer/collider/contact.h>

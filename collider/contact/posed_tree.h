@@ -1,5 +1,5 @@
 // The hierarchy of a mesh placed in a frame that it shares with another mesh.
-// Tested by tests/collider/distance.cpp.
+// Tested by tests/collider/distance.cpp through distance().
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // A coarse distance bound for places far from a field's surface.
-// Tested by tests/collider/field_rays.cpp.
+// Tested by tests/collider/field_rays.cpp through Field::raycast().
 #pragma once
 
 #include <algorithm>

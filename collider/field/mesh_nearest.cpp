@@ -1,6 +1,6 @@
 // Closest-triangle search by branch and bound, nearest box first: N. Roussopoulos, S. Kelley, F. Vincent, "Nearest
 // neighbor queries", SIGMOD 1995, 71-79. Highway compiles it once for each instruction set.
-// Tested by tests/collider/field_closest.cpp.
+// Tested by tests/collider/field_closest.cpp through Field::closest().
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "collider/field/mesh_nearest.cpp"
 #include <hwy/cache_control.h>

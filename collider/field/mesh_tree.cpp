@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "collider/field/path.h"
+#include "sdf/base/triangle_corners.h"
 
 namespace bilayer::detail {
 namespace {
@@ -18,9 +19,6 @@ namespace {
 constexpr double longestEdge = 16;
 /// Thinner triangles have no reliable normal [voxels].
 constexpr double thinnest = 1e-7;
-/// Min height relative to the longest edge. Flatter triangles use their edges, which are at least as accurate as the
-/// projection onto the plane.
-constexpr double flatness = 1e-10;
 /// Points farther from the mesh than `farthest` are replaced by points of the same direction at `farEnough` [mesh
 /// sizes]. There, single precision is off by a thousandth of a size, and the change of direction to off-centre features
 /// by half as much. Both are less than a millionth of the distance of points beyond `farthest`.
@@ -132,7 +130,7 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
         std::max({glm::dot(edges[0], edges[0]), glm::dot(edges[1], edges[1]), glm::dot(edges[2], edges[2])});
     NearestFeature found{.triangle = triangle};
     const auto inside = [&](std::size_t i) { return glm::dot(glm::cross(c[i], edges[i]), n) >= 0; };
-    if (n2 > flatness * flatness * longest2 * longest2 && inside(0) && inside(1) && inside(2)) {
+    if (n2 > minRelativeHeight * minRelativeHeight * longest2 * longest2 && inside(0) && inside(1) && inside(2)) {
         found.offset = (glm::dot(c[0], n) / n2) * n;
         if (!normals_.isFlat(triangle)) found.normal = n / std::sqrt(n2);
     } else {

@@ -1,5 +1,5 @@
 // Morton order: points that are close in space are mostly close in this order.
-// Tested by tests/sdf/flood.cpp.
+// Tested by tests/sdf/flood.cpp through build().
 #pragma once
 
 #include <array>

@@ -1,7 +1,7 @@
 // SIMD distances of points to the boxes and leaves of a WideTree. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h. No sum crosses lanes, so all
 // instruction sets give the same bytes.
-// Tested by tests/sdf/wide_tree.cpp.
+// Tested by tests/sdf/pseudonormal.cpp through build().
 #if defined(BILAYER_SDF_LEAF_MEASURE_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_LEAF_MEASURE_H
 #undef BILAYER_SDF_LEAF_MEASURE_H

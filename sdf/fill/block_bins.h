@@ -1,5 +1,5 @@
 // Finds the balls that reach each block of a brick, by a counting sort per brick.
-// Tested by tests/sdf/exact.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
 #include <algorithm>

@@ -20,8 +20,6 @@ namespace {
 /// Side of the cube of blocks that one task fills: large enough to amortize a task, small enough for many tasks
 /// [voxels].
 constexpr int taskSide = 32;
-/// Tolerance of the search for all triangles that can be nearest [voxels].
-constexpr float sideSlack = 1e-3f;
 /// Maximum node side that opens every node: only leaves remain in the list.
 constexpr float openAll = -1;
 

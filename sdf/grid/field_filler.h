@@ -1,6 +1,6 @@
 // The state of one build. It fills a field by one method of distances and one of signs, again if needed, and makes a
 // LevelSet of the last one.
-// Tested by tests/sdf/build.cpp.
+// Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <atomic>

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <random>
 
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/bvh/triangle_tree.h"
