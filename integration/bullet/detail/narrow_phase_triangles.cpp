@@ -1,5 +1,5 @@
 // Contacts between a field and triangles that Bullet passes one at a time.
-// Tested by tests/bullet/open_surface.cpp.
+// Tested by tests/bullet/open_surface.cpp through collideTriangles().
 #include <LinearMath/btAabbUtil2.h>
 #include <bilayer/collider/contact.h>
 
