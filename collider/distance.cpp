@@ -4,6 +4,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "collider/contact/body_transform.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/mesh_distance.h"
 #include "collider/field/field_data.h"
@@ -34,10 +35,6 @@ struct Bodies {
 
     Bodies swapped() const { return {b, a, aToB.inverted()}; }
 };
-
-double sizeOf(const Placed& body) {
-    return double(body.scale) * double(body.collider.bounds().longestSide());
-}
 
 WitnessPoint witness(const Similarity& toWorld, const TrianglePoint& point, std::uint32_t triangle) {
     return {toWorld(point.position), triangle, point.feature, point.index};
@@ -155,7 +152,8 @@ BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& o
     if (start) *start = {found.triangleA, found.triangleB};
     if (found.found() && found.distance == 0) return intersecting(bodies, found);
     if (isInside(bodies)) return contained(deepestOf(bodies), Overlap::aInsideB);
-    if (isInside(bodies.swapped())) return contained(swapped(deepestOf(bodies.swapped())), Overlap::bInsideA);
+    const Bodies reversed = bodies.swapped();
+    if (isInside(reversed)) return contained(swapped(deepestOf(reversed)), Overlap::bInsideA);
     return found.found() ? separated(bodies, found) : BodyDistance{};
 }
 

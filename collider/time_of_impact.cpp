@@ -6,6 +6,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <stdexcept>
 
+#include "collider/contact/body_transform.h"
 #include "sdf/base/finite.h"
 
 namespace bilayer {
@@ -43,14 +44,11 @@ double radiusOf(const Placed& body) {
 }
 
 double toleranceFor(const Placed& a, const Placed& b, float asked) {
-    const auto size = [](const Placed& body) {
-        return double(body.scale) * double(body.collider.bounds().longestSide());
-    };
     const auto voxel = [](const Placed& body) {
         return double(body.scale) * double(body.collider.field().voxelSize());
     };
     const double wanted = asked > 0 ? double(asked) : defaultTolerance * std::min(voxel(a), voxel(b));
-    return std::max(wanted, minTolerance * std::max(size(a), size(b)));
+    return std::max(wanted, minTolerance * std::max(sizeOf(a), sizeOf(b)));
 }
 
 }  // namespace
