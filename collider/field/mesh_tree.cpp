@@ -84,11 +84,11 @@ NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& poi
     const glm::dvec3 from = toTree(point) - vectorOf(leaf.cell) - vectorOf(leaf.corner);
     const glm::dvec3 along = vectorOf(leaf.along), normal = vectorOf(leaf.normal);
     const double x = glm::dot(from, along), y = glm::dot(from, glm::cross(normal, along)), z = glm::dot(from, normal);
-    const double besideBC = double(leaf.directionBC[0][i]) * y -
+    const double acrossBC = double(leaf.directionBC[0][i]) * y -
                             double(leaf.directionBC[1][i]) * (x - double(leaf.lengthAB[i])),
-                 besideAC = double(leaf.directionAC[1][i]) * x - double(leaf.directionAC[0][i]) * y;
+                 acrossAC = double(leaf.directionAC[1][i]) * x - double(leaf.directionAC[0][i]) * y;
     const double room = roomAt(point) * perMetre_;
-    const bool over = std::min({y, besideBC, besideAC}) > room && std::abs(z) < near;
+    const bool over = std::min({y, acrossBC, acrossAC}) > room && std::abs(z) < near;
     if (!over || normals_.isFlat(triangle)) return featureOf(triangle, point);
     return {.triangle = triangle,
             .offset = (-z * double(voxelSize_)) * normal,

@@ -91,7 +91,7 @@ struct Narrowing {
     }
 };
 
-// Does the work of narrow().
+// Does the work of collectNodes().
 inline void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
                        NodeList& to) {
     const Tag tag;
