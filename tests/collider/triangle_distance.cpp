@@ -74,6 +74,14 @@ TriangleCorners nearlyParallel(const TriangleCorners& other, double angle, Rando
     return {from, from + edge + angle * pointOf(random), pointOf(random)};
 }
 
+// A triangle whose first edge passes over that of another one at a small angle: both are closest in their middles.
+TriangleCorners crossingAbove(const TriangleCorners& other, double angle, Random& random) {
+    const glm::dvec3 edge = other[1] - other[0], middle = 0.5 * (other[0] + other[1]);
+    const glm::dvec3 up = glm::normalize(glm::cross(edge, pointOf(random))),
+                     half = 0.5 * edge + angle * glm::cross(up, edge), over = middle + 0.1 * up;
+    return {over - half, over + half, over + up + pointOf(random)};
+}
+
 // A triangle that shares a corner, an edge, or a point within its face with another one.
 TriangleCorners touching(const TriangleCorners& other, int kind, Random& random) {
     TriangleCorners made = anyTriangle(random);
@@ -148,8 +156,10 @@ TEST_CASE("Edges that are parallel, or off by any small angle, have the distance
     for (int round = 0; round < 300; ++round) {
         const TriangleCorners one = anyTriangle(random);
         std::vector<TriangleCorners> others;
-        for (const double angle : {0.0, 1e-15, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-4})
+        for (const double angle : {0.0, 1e-15, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-4}) {
             others.push_back(nearlyParallel(one, angle, random));
+            others.push_back(crossingAbove(one, angle, random));
+        }
         const glm::dvec3 shift = pointOf(random);
         others.push_back({one[0] + shift, one[1] + shift, one[2] + shift});
         check(one, others);
