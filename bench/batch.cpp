@@ -39,8 +39,8 @@ using Words = std::vector<std::string>;
 struct Conversion {
     std::string name;
     std::vector<double> seconds;  // one entry a round
-    std::vector<double>
-        overhead;  // of a mesh, in addition to reading, building and writing [s]; for the batch on one core
+    // Time of a mesh in addition to reading, building and writing [s]; for the batch on one core.
+    std::vector<double> overhead;
 };
 
 // The seconds that a command takes; throws with its first line of errors if it fails.

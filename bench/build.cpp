@@ -168,12 +168,12 @@ void printSummary(const std::vector<Row>& rows) {
             const Summary summary = summarize(rows, builder, halfWidth);
             if (summary.ratios.empty() || builder == Builder::reference) continue;
             const double mean = geometricMean(summary.ratios),
-                         least = *std::min_element(summary.ratios.begin(), summary.ratios.end());
+                         smallest = *std::min_element(summary.ratios.begin(), summary.ratios.end());
             const bool held = builder == Builder::exact || builder == Builder::doubleLayer;
             const double required = builder == Builder::exact ? exactRequired : doubleLayerRequired;
-            fmt::print("  {:<20} half width {}: geometric mean {}, least {} at {}\n", nameOf(builder), halfWidth,
+            fmt::print("  {:<20} half width {}: geometric mean {}, minimum {} at {}\n", nameOf(builder), halfWidth,
                        held ? judged(mean, required) : fmt::format("{:.1f}", mean),
-                       held ? judged(least, cellRequired) : fmt::format("{:.1f}", least), summary.slowestCell);
+                       held ? judged(smallest, cellRequired) : fmt::format("{:.1f}", smallest), summary.slowestCell);
         }
     fmt::print("Times as fast on 2 threads as on 1\n");
     for (const float halfWidth : {3.f, 2.f})
@@ -183,7 +183,7 @@ void printSummary(const std::vector<Row>& rows) {
             const double mean = geometricMean(summary.speedUps);
             const bool held = builder == Builder::exact || builder == Builder::doubleLayer;
             fmt::print(
-                "  {:<20} half width {}: geometric mean {:.2f}{}, least {:.2f}\n", nameOf(builder), halfWidth, mean,
+                "  {:<20} half width {}: geometric mean {:.2f}{}, minimum {:.2f}\n", nameOf(builder), halfWidth, mean,
                 held ? fmt::format(" (required {}: {})", speedUpRequired, mean >= speedUpRequired ? "met" : "short")
                      : "",
                 *std::min_element(summary.speedUps.begin(), summary.speedUps.end()));

@@ -131,7 +131,7 @@ Contest contest(const Options& options, const fs::path& mesh, const fs::path& sc
         return Words{self, "--work",       work,       "--mesh",    mesh,   "--output",
                      out,  "--resolution", resolution, "--threads", threads};
     };
-    const std::map<std::string, Words> ways{
+    const std::map<std::string, Words> readers{
         {"bilayer",
          {options.bilayer, "build", mesh, "-o", out, "--resolution", resolution, "--threads", threads, "--json"}},
         {"vdb_tool", {"vdb_tool", "-read", mesh, "-mesh2ls", "dim=" + resolution, "-write", out}},
@@ -140,7 +140,7 @@ Contest contest(const Options& options, const fs::path& mesh, const fs::path& sc
         {"read, Assimp", itself("read-assimp")}};
     Contest result;
     for (int round = 0; round < options.rounds; ++round)
-        for (const auto& [name, words] : ways) {
+        for (const auto& [name, words] : readers) {
             std::error_code ignored;
             fs::remove(out, ignored);
             const CommandResult run = runCommand(words, scratch);
@@ -168,8 +168,8 @@ std::string cell(double value, int digits) {
     return std::isnan(value) ? "fails" : fmt::format("{:.{}f}", value, digits);
 }
 
-double medianOf(const Contest& c, const std::string& way) {
-    const auto found = c.seconds.find(way);
+double medianOf(const Contest& c, const std::string& reader) {
+    const auto found = c.seconds.find(reader);
     return found == c.seconds.end() ? std::nan("") : median(found->second);
 }
 

@@ -92,7 +92,7 @@ openvdb::Index64 brokenVoxels(const FloatGrid& liquid) {
     return check.failureCount();
 }
 
-struct Way {
+struct SeedMethod {
     std::string name;
     std::function<void(FloatGrid&)> pour;
     std::vector<double> seconds{};
@@ -104,25 +104,25 @@ void raceAt(const std::string& name, const Mesh& mesh, float resolution, const O
     const fluid::Placement placement = placementOf(mesh);
     const LevelSet field = build(mesh, {.voxelSize = voxelSize});
     const FloatGrid::Ptr liquid = pool(placed(mesh, placement), voxelSize);
-    std::vector<Way> ways{
+    std::vector<SeedMethod> methods{
         {"seed, mesh", [&](FloatGrid& g) { fluid::seed(g, mesh, placement); }},
         {"seed, field", [&](FloatGrid& g) { fluid::seed(g, field, placement); }},
         {"meshToLevelSet", [&](FloatGrid& g) { seedByOpenVdb(g, mesh, placement, false); }},
         {"renormalised", [&](FloatGrid& g) { seedByOpenVdb(g, mesh, placement, true); }},
     };
     for (int round = 0; round < options.rounds; ++round)
-        for (Way& way : ways) {
+        for (SeedMethod& method : methods) {
             const FloatGrid::Ptr poured = liquid->deepCopy();
             const Stopwatch watch;
-            way.pour(*poured);
-            way.seconds.push_back(watch.seconds());
-            way.broken = brokenVoxels(*poured);
+            method.pour(*poured);
+            method.seconds.push_back(watch.seconds());
+            method.broken = brokenVoxels(*poured);
         }
-    const double ours = median(ways[0].seconds), ofField = median(ways[1].seconds), bare = median(ways[2].seconds),
-                 clean = median(ways[3].seconds);
+    const double ours = median(methods[0].seconds), ofField = median(methods[1].seconds),
+                 bare = median(methods[2].seconds), clean = median(methods[3].seconds);
     fmt::print("| {} | {:g} | {:.0f} | {:.0f} | {:.0f} | {:.0f} | {:.1f} | {:.1f} | {:.1f} | {} / {} / {} / {} |\n",
                name, resolution, 1e3 * ours, 1e3 * ofField, 1e3 * bare, 1e3 * clean, bare / ours, clean / ours,
-               clean / ofField, ways[0].broken, ways[1].broken, ways[2].broken, ways[3].broken);
+               clean / ofField, methods[0].broken, methods[1].broken, methods[2].broken, methods[3].broken);
     std::fflush(stdout);
 }
 
@@ -147,8 +147,9 @@ SlopeError slopeError(const FloatGrid& liquid) {
     const auto isSmooth = [&](const openvdb::Coord& at, const openvdb::Vec3f& slope) {
         return std::all_of(std::begin(openvdb::util::COORD_OFFSETS), std::begin(openvdb::util::COORD_OFFSETS) + 6,
                            [&](const openvdb::Coord& step) {
-                               const openvdb::Vec3f& beside = slopes.getValue(at + step);
-                               return slope.dot(beside) > std::cos(15 * pi / 180) * slope.length() * beside.length();
+                               const openvdb::Vec3f& neighbour = slopes.getValue(at + step);
+                               return slope.dot(neighbour) >
+                                      std::cos(15 * pi / 180) * slope.length() * neighbour.length();
                            });
     };
     double sum = 0, smoothSum = 0, count = 0, smoothCount = 0;

@@ -1,5 +1,5 @@
-// Prints hashes of the fields of a folder of meshes, for every method and sign option. Two versions of the library with
-// the same output build the same fields.
+// Prints hashes of the fields of a folder of meshes and its subfolders, for every method and sign option. Two versions
+// of the library with the same output build the same fields.
 #include <fmt/format.h>
 #include <openvdb/tree/LeafManager.h>
 
@@ -99,7 +99,7 @@ std::uint64_t hashOf(const LevelSet& field) {
 
 std::vector<fs::path> filesIn(const fs::path& folder) {
     std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(folder))
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
         if (entry.is_regular_file()) files.push_back(entry.path());
     std::sort(files.begin(), files.end());
     return files;
@@ -120,21 +120,21 @@ std::string outcome(const Mesh& mesh, const Mode& mode, const Options& options) 
 }
 
 void print(const fs::path& file, const Options& options) {
+    const std::string name = fs::relative(file, options.meshes).generic_string();
     Mesh mesh;
     try {
         mesh = readMesh(file);
     } catch (const std::exception&) {
-        fmt::print("{}: not readable\n", file.filename().string());
+        fmt::print("{}: not readable\n", name);
         return;
     }
-    fmt::print("{}: mesh {:016x}\n", file.filename().string(), hash(mesh));
-    for (const Mode& mode : modes)
-        fmt::print("{}: {} {}\n", file.filename().string(), mode.name, outcome(mesh, mode, options));
+    fmt::print("{}: mesh {:016x}\n", name, hash(mesh));
+    for (const Mode& mode : modes) fmt::print("{}: {} {}\n", name, mode.name, outcome(mesh, mode, options));
 }
 
 int run(int argc, char** argv) {
     Options options;
-    CLI::App app("Hashes of the fields of all meshes of a folder, by every method and sign option.");
+    CLI::App app("Hashes of the fields of all meshes of a folder and its subfolders, by every method and sign option.");
     app.add_option("--meshes", options.meshes, "folder of the meshes")->check(CLI::ExistingDirectory);
     app.add_option("--resolution", options.resolution, "voxels along the longest side")->capture_default_str();
     app.add_option("--threads", options.threads, "maximum count of threads; 0: all")->check(CLI::Range(0, 1024));

@@ -16,8 +16,8 @@ constexpr double fromCellFaces = 1e-3;  // [voxels]
 constexpr float cameraDistance = 1.5f;  // from the box's centre [diagonals of the box]
 
 double cellFaceDistance(const glm::dvec3& voxels) {
-    const glm::dvec3 way = glm::abs(voxels - glm::round(voxels));
-    return std::min({way.x, way.y, way.z});
+    const glm::dvec3 offset = glm::abs(voxels - glm::round(voxels));
+    return std::min({offset.x, offset.y, offset.z});
 }
 
 // Interleaves the bits of the three coordinates.

@@ -36,7 +36,7 @@ class Field : public Rival {
   public:
     Field(const Mesh& mesh, float voxels, const PointSampler& sampler, ContactAccuracy measure)
         : sampler_(sampler),
-          name_(sampler.sample                                  ? "bilayer, " + sampler.device
+          name_(sampler                                         ? "bilayer, " + sampler.device()
                 : measure == ContactAccuracy::exactNearFeatures ? "bilayer"
                                                                 : fmt::format("bilayer, by {}", nameOf(measure))) {
         BuildOptions how{.voxelSize = voxelSizeFor(mesh, voxels)};

@@ -89,9 +89,9 @@ Shape shapeNamed(const std::string& name) {
 glm::dvec3 gradientOf(const Distance& distance, const glm::dvec3& point, double step) {
     glm::dvec3 gradient;
     for (int axis = 0; axis < 3; ++axis) {
-        glm::dvec3 way(0);
-        way[axis] = step;
-        gradient[axis] = (distance(point + way) - distance(point - way)) / (2 * step);
+        glm::dvec3 offset(0);
+        offset[axis] = step;
+        gradient[axis] = (distance(point + offset) - distance(point - offset)) / (2 * step);
     }
     return glm::length(gradient) > steepest ? glm::normalize(gradient) : glm::dvec3(0);
 }
@@ -156,9 +156,9 @@ Errors errorsOfClosest(const Field& field, const std::vector<Place>& all) {
     return errorsOf(all, field.voxelSize(), [&](const glm::vec3& point) -> std::optional<Answer> {
         const ClosestPoint closest = field.closest(point);
         if (!closest.found) return std::nullopt;
-        const glm::dvec3 way = glm::dvec3(point) - glm::dvec3(closest.position);
+        const glm::dvec3 offset = glm::dvec3(point) - glm::dvec3(closest.position);
         const bool onFace = closest.feature == Feature::face;
-        return Answer{closest.distance, onFace ? glm::dvec3(closest.normal) : closest.distance < 0 ? -way : way};
+        return Answer{closest.distance, onFace ? glm::dvec3(closest.normal) : closest.distance < 0 ? -offset : offset};
     });
 }
 

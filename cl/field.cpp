@@ -9,12 +9,12 @@
 #include <stdexcept>
 #include <utility>
 
+#include "cl/detail/device_field_build.h"
 #include "cl/detail/enqueue.h"
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/memory.h"
 #include "cl/detail/program.h"
 #include "cl/detail/queue_guard.h"
-#include "cl/detail/resident_field.h"
 #include "cl/detail/timing.h"
 #include "collider/field/batch.h"
 #include "collider/field/field_layout.h"
@@ -152,7 +152,7 @@ DeviceField::DeviceField(const Device& device, const Mesh& mesh, const BuildOpti
                          const OpenclOptions& options) try {
     const std::uint64_t budget = memoryBudget(device.impl(), options.memoryMiB);
     data_ = std::make_shared<Data>(device, options, budget - budget / fillPart);
-    ResidentField field = buildResident(device, mesh, build, options, data_->memory);
+    BuiltDeviceField field = buildDeviceField(device, mesh, build, options, data_->memory);
     data_->layout = std::move(field.layout);
     data_->buildTimes = field.times;
 } catch (const cl::Error& error) {

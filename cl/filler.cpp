@@ -6,6 +6,7 @@
 #include "cl/detail/prism.h"
 #include "cl/detail/program.h"
 #include "cl/detail/timing.h"
+#include "sdf/leaf/blocks.h"
 
 namespace bilayer {
 
@@ -21,7 +22,7 @@ OpenclFiller openclFiller(const Device& device, const OpenclOptions& options) {
             throw deviceError(error, device.info().name);
         }
     };
-    return {{"opencl", device.info().name, fill}, [sum] { return sum->get(); }};
+    return {BlockFiller({"opencl", device.info().name, fill}), [sum] { return sum->get(); }};
 }
 
 }  // namespace bilayer

@@ -10,12 +10,12 @@
 #include <stdexcept>
 #include <utility>
 
+#include "cl/detail/device_field_build.h"
 #include "cl/detail/enqueue.h"
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/memory.h"
 #include "cl/detail/program.h"
 #include "cl/detail/queue_guard.h"
-#include "cl/detail/resident_field.h"
 #include "cl/detail/timing.h"
 #include "collider/contact/sampled_points.h"
 
@@ -281,7 +281,7 @@ OpenclPointSampler openclPointSampler(const Device& device, const OpenclOptions&
         const std::lock_guard lock(*mutex);
         sum->add(sampler->sample(bodies, queries, answers));
     };
-    return {{"opencl", device.info().name, sample}, [sum] { return sum->get(); }};
+    return {PointSampler({"opencl", device.info().name, sample}), [sum] { return sum->get(); }};
 } catch (const cl::Error& error) {
     throw deviceError(error, device.info().name);
 }

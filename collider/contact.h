@@ -7,7 +7,6 @@
 #include <bilayer/collider/shapes.h>
 
 #include <cstdint>
-#include <functional>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <span>
@@ -18,9 +17,7 @@ namespace bilayer {
 
 namespace detail {
 struct ContactMemory;
-struct SampledBody;
-struct PointQuery;
-class FoundPoints;
+struct DeviceSampler;
 }  // namespace detail
 
 /// The predicted motion of a body over the step, in world coordinates. A point x of the body moves by displacement +
@@ -145,13 +142,20 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
                       std::vector<Contact>& contacts, ContactCache* cache = nullptr);
 
 /// Samples the surface points of many bodies in each other's fields on a device. openclPointSampler() in
-/// cl/field.h makes one. Call it from one thread at a time.
-struct PointSampler {
-    std::string backend;  ///< "opencl"
-    std::string device;   ///< name of the device
-    /// Throws on device errors; the next call may succeed.
-    std::function<void(std::span<const detail::SampledBody>, std::span<const detail::PointQuery>, detail::FoundPoints&)>
-        sample;
+/// cl/field.h makes one. Use it from one thread at a time. Cheap to copy.
+class PointSampler {
+  public:
+    PointSampler() = default;  ///< no sampler
+    explicit PointSampler(detail::DeviceSampler sampler);
+
+    explicit operator bool() const { return data_ != nullptr; }
+    const std::string& backend() const;  ///< "opencl"; requires a sampler
+    const std::string& device() const;   ///< the device's name; requires a sampler
+
+    const detail::DeviceSampler& data() const { return *data_; }
+
+  private:
+    std::shared_ptr<const detail::DeviceSampler> data_;
 };
 
 }  // namespace bilayer

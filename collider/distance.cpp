@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "collider/contact/body_distance.h"
+#include "collider/contact/body_transform.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/mesh_distance.h"
 #include "collider/field/field_data.h"
@@ -33,10 +34,6 @@ struct Bodies {
 
     Bodies swapped() const { return {b, a, aToB.inverted()}; }
 };
-
-double sizeOf(const Placed& body) {
-    return double(body.scale) * double(body.collider.bounds().longestSide());
-}
 
 BodyDistance separated(const Bodies& bodies, const MeshDistance& found) {
     const Similarity bToWorld = toWorld(bodies.b);
@@ -144,7 +141,8 @@ BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& o
     if (start) *start = {found.triangleA, found.triangleB};
     if (found.found() && found.distance == 0) return intersecting(bodies, found);
     if (isInside(bodies)) return contained(deepestOf(bodies), Overlap::aInsideB);
-    if (isInside(bodies.swapped())) return contained(swapped(deepestOf(bodies.swapped())), Overlap::bInsideA);
+    const Bodies reversed = bodies.swapped();
+    if (isInside(reversed)) return contained(swapped(deepestOf(reversed)), Overlap::bInsideA);
     return found.found() ? separated(bodies, found) : BodyDistance{};
 }
 

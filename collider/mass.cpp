@@ -93,8 +93,9 @@ MassProperties detail::massProperties(const Moments& moments, const glm::dvec3& 
     result.inertia = glm::mat3(inertia);
     result.principalInertia = glm::vec3(principal.values);
     result.principalAxes = glm::quat(axes);
-    const double least = principal.values[0], most = principal.values[2];
-    if (least > 0 && !(least >= std::numeric_limits<float>::min() && most <= std::numeric_limits<float>::max()))
+    const double smallest = principal.values[0], largest = principal.values[2];
+    if (smallest > 0 &&
+        !(smallest >= std::numeric_limits<float>::min() && largest <= std::numeric_limits<float>::max()))
         throw std::invalid_argument(
             "mass properties: the moments of inertia are beyond single precision: scale the mesh");
     return result;

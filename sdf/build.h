@@ -6,7 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -17,16 +17,22 @@
 namespace bilayer {
 
 namespace detail {
-struct FillJob;
+struct DeviceFiller;
 }
 
-/// A device that fills the blocks of a field; openclFiller() in cl/filler.h creates one. build() uses the CPU by
-/// default.
-struct BlockFiller {
-    std::string backend;  ///< "opencl"
-    std::string device;   ///< the device's name
-    /// Fills the blocks of one job. build() passes on any exception that it throws.
-    std::function<void(const detail::FillJob&)> fill;
+/// A device that fills the blocks of a field. openclFiller() in cl/filler.h makes one; build() uses the CPU by default.
+/// Cheap to copy.
+class BlockFiller {
+  public:
+    explicit BlockFiller(detail::DeviceFiller filler);
+
+    const std::string& backend() const;  ///< "opencl"
+    const std::string& device() const;   ///< the device's name
+
+    const detail::DeviceFiller& data() const { return *data_; }
+
+  private:
+    std::shared_ptr<const detail::DeviceFiller> data_;
 };
 
 /// Builds the signed distance field of a mesh. The bytes of the result do not depend on the thread count.

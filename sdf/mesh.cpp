@@ -17,11 +17,11 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/base/equal_points.h"
 #include "sdf/base/finite.h"
 #include "sdf/base/large_array.h"
 #include "sdf/base/parallel_parts.h"
 #include "sdf/base/welding.h"
-#include "sdf/mesh/equal_points.h"
 
 namespace bilayer {
 

@@ -15,7 +15,7 @@ enum class Subdivision {
     recursive,  ///< Fig. 2 of the paper: halves and quarters until the area is below epsilon
 };
 
-/// Parameters of the double layer method. The defaults are the paper's.
+/// Parameters of the double layer method, in voxels. Defaults, and the names delta and epsilon, are the paper's.
 struct DoubleLayerOptions {
     float delta = 0.5f;       ///< distance of each layer from the surface [voxels], in [0.1, 4]
     float epsilon = 1.0f;     ///< area per sample [voxels^2], in [1e-4, 1e4]

@@ -89,7 +89,7 @@ std::optional<BlockFiller> makeFiller(const BuildArguments& a) {
 
 LevelSet timedBuild(const Mesh& mesh, const BuildArguments& a, BuildOutcome& outcome) {
     const std::optional<BlockFiller> filler = makeFiller(a);
-    outcome.device = filler ? filler->device : fmt::format("processor ({})", simdName());
+    outcome.device = filler ? filler->device() : fmt::format("processor ({})", simdName());
     ProgressBar bar("building");
     BuildOptions options = a.options;
     options.progress = bar.callback();

@@ -157,7 +157,7 @@ openvdb::FloatGrid::ConstPtr openvdbField(const Mesh& mesh, float voxelSize, flo
 }
 
 constexpr float wallSide = 30, wallBand = 1.5f;  // [voxels]
-constexpr int wallCells = 20, wallTurns = 6;
+constexpr int wallCells = 20, wallRotations = 6;
 constexpr float wallHalfWidth = 3;
 
 // Voxels within the band, and those of wrong sign.
@@ -182,7 +182,7 @@ json measureWalls(const Run&) {
         std::mt19937 random(seed);
         std::uniform_real_distribution<float> any(-1, 1);
         Sides layers, openvdb, exact;
-        for (int turn = 0; turn < wallTurns; ++turn) {
+        for (int rotation = 0; rotation < wallRotations; ++rotation) {
             const glm::vec3 axis(any(random), any(random), any(random));
             const glm::mat4 place = glm::rotate(
                 glm::translate(glm::mat4(1), glm::vec3(any(random), any(random), any(random))), 3 * any(random), axis);
@@ -237,7 +237,7 @@ std::string textWalls(const json& data) {
                "Section 5 names the limit: layers that cross. Walls of {} x {} voxels, thinner and thinner, their two "
                "faces cut into triangles independently, {} places and turns each (seed {}); voxels within {} of the "
                "surface on the wrong side. OpenVDB is `meshToVolume` without renormalisation.\n\n",
-               wallSide, wallSide, wallTurns, data["seed"].get<unsigned>(), wallBand) +
+               wallSide, wallSide, wallRotations, data["seed"].get<unsigned>(), wallBand) +
            table({"thickness [voxels]", "double-layer: outside called inside", "inside called outside",
                   "OpenVDB: outside called inside", "inside called outside", "exact: outside called inside",
                   "inside called outside"},

@@ -31,11 +31,11 @@ class Layers {
             rows(a, b, c, area);
         else
             recurse(a, b, c, area);
-        most = std::max(most, samples - before);
+        largest = std::max(largest, samples - before);
     }
 
     std::vector<float> inner, outer;  // D_I and D_E, squared
-    std::size_t samples = 0, most = 0;
+    std::size_t samples = 0, largest = 0;
 
   private:
     // Algorithm 1.
@@ -138,7 +138,7 @@ DenseField denseDoubleLayer(const Mesh& mesh, const Lattice& lattice, const Dens
             phi[i] = inner2 <= outer2 ? std::min(0.f, delta - std::sqrt(outer2))
                                       : std::max(0.f, std::sqrt(inner2) - delta);  // Eq. 3
     }
-    DenseField field{lattice, std::move(phi), layers.samples, layers.most};
+    DenseField field{lattice, std::move(phi), layers.samples, layers.largest};
     scanConvert(field);
     return field;
 }

@@ -125,7 +125,7 @@ std::string opening() {
     return fmt::format(
         "# The double layer paper, repeated\n\nY. Wu, J. Man and Z. Xie, \"A double layer method for constructing "
         "signed distance fields from triangle meshes\", *Graphical Models* 76 (2014) 214-223: each of its tables, "
-        "figures and claims, its own figures beside those of this machine. `./run paper` measures all and writes this "
+        "figures and claims, its own figures next to those of this machine. `./run paper` measures all and writes this "
         "page, `./run paper table2` a part of it; what was measured lies in `docs/paper/*.json`. The paper's numbers "
         "stand in `bench/paper/published.h`. [method.md](method.md) tells how the method is "
         "done here.\n\nThe paper ran on a {} and a {}. Its grids span a box of side {}: that is deduced from its "

@@ -20,7 +20,7 @@ using nlohmann::json;
 struct Difference {
     double worst = 0;             // maximum difference of nodes that count as equal [steps]
     std::uint64_t reached = 0;    // nodes
-    std::uint64_t halfWay = 0;    // that depend on how a sample half-way between two nodes is rounded
+    std::uint64_t halfway = 0;    // that depend on how a sample half-way between two nodes is rounded
     std::uint64_t ties = 0;       // with equally near layers and opposite signs
     std::uint64_t different = 0;  // without such a reason
     std::uint64_t far = 0, farWrong = 0, farWrongBlocks = 0;  // without a distance in either field, and on the wrong
@@ -50,7 +50,7 @@ struct Node {
 void compare(const Node& low, const Node& high, const Node& blocks, bool inside, Difference& result) {
     const double nearest = std::min(blocks.difference(low), blocks.difference(high));
     result.reached += blocks.known;
-    result.halfWay += low.difference(high) > 0;
+    result.halfway += low.difference(high) > 0;
     if (nearest <= rounding)
         result.worst = std::max(result.worst, nearest);
     else
@@ -100,7 +100,7 @@ json measureSame(const Run& run) {
                             {"recursive", subdivision == Subdivision::recursive},
                             {"worst", found.worst},
                             {"reached", found.reached},
-                            {"halfWay", found.halfWay},
+                            {"halfWay", found.halfway},
                             {"different", found.different},
                             {"ties", found.ties},
                             {"far", found.far},

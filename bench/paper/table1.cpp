@@ -84,7 +84,7 @@ std::string listed(const json& rows, const char* what) {
 
 std::string textTable1(const json& data) {
     std::vector<std::vector<std::string>> metres, inSteps;
-    double least = 1e9, most = 0;
+    double smallest = 1e9, largest = 0;
     for (std::size_t i = 0; i < published::table1.size(); ++i) {
         const published::Error& paper = published::table1[i];
         const json& row = data["rows"][i];
@@ -103,8 +103,8 @@ std::string textTable1(const json& data) {
                            pair("all"), pair("near"), pair("halfCell"), pair("blocks"),
                            fmt::format("{} / {}", digits(row["exact"]["worst"], 2), digits(row["exact"]["mean"], 2)),
                            fmt::format("{}", row["all"]["signs"].get<std::uint64_t>())});
-        least = std::min(least, paper.mean / paper.step);
-        most = std::max(most, paper.mean / paper.step);
+        smallest = std::min(smallest, paper.mean / paper.step);
+        largest = std::max(largest, paper.mean / paper.step);
     }
     metres.push_back({"order", "", papersOrder(&published::Error::worst), order(data["rows"], "all", "worst"),
                       papersOrder(&published::Error::mean), order(data["rows"], "all", "mean"),
@@ -157,7 +157,7 @@ std::string textTable1(const json& data) {
                "guess. Nor does the step printed for {} nodes go with the others: {} / {} is {:.3f}.\n",
                smaller(0), published::table1[0].nodes, smaller(last), published::table1[last].nodes,
                perEpsilon.empty() ? "" : fmt::format(", {} for an epsilon of surface on these grids", perEpsilon),
-               order(data["rows"], "all", "mean"), minRatio, maxRatio, least, most, steps(0, "all", "mean"),
+               order(data["rows"], "all", "mean"), minRatio, maxRatio, smallest, largest, steps(0, "all", "mean"),
                steps(last, "all", "mean"), std::sqrt(3.0) / 4, published::table1[0].nodes, boxSide,
                published::table1[0].nodes - 1, boxSide / (published::table1[0].nodes - 1));
 }

@@ -113,7 +113,7 @@ std::string textTable2(const json& data) {
            table({"model", "triangles [K], paper / here", "AWPN, paper", "AWPN", "double layer, paper", "dense, plain",
                   "dense", "dense, recursive", "samples, Algorithm 1 / recursive"},
                  rivals) +
-           "\nbilayer beside it, seconds on 1 and 2 threads, half width 2; OpenVDB is `meshToVolume` without "
+           "\nbilayer next to it, seconds on 1 and 2 threads, half width 2; OpenVDB is `meshToVolume` without "
            "renormalisation:\n\n" +
            table({"model", "dense", "double-layer, 1", "2", "exact, 1", "2", "pseudonormal, 1", "2", "OpenVDB, 1", "2"},
                  ours) +

@@ -83,7 +83,7 @@ json measureTable4(const Run& run) {
 
 std::string textTable4(const json& data) {
     std::vector<std::vector<std::string>> times, memory;
-    double most = 0;
+    double largest = 0;
     for (std::size_t i = 0; i < published::table4.size(); ++i) {
         const published::Growth& paper = published::table4[i];
         const json& row = data["rows"][i];
@@ -123,7 +123,7 @@ std::string textTable4(const json& data) {
                             seconds(whole(device, Builder::exactOpencl)));
         bytes.push_back(fmt::format("{:.1f}", row["active"].get<double>() / 1e6));
         for (const char* name : {"double-layer", "exact"})
-            most = std::max(most, row["peaks"][name].get<double>() / MiB);
+            largest = std::max(largest, row["peaks"][name].get<double>() / MiB);
         times.push_back(cells);
         memory.push_back(bytes);
     }
@@ -150,14 +150,15 @@ std::string textTable4(const json& data) {
                "scale holds for all axes. Steps are the same along all axes. TBB, and the host's part of OpenCL, on {} "
                "threads.{}\n\n",
                data["triangles"].get<int>(), threads, legend(devices)) +
-           table(head, times) + "\nMost memory in use at once [MiB], beside the mesh:\n\n" + table(memoryHead, memory) +
+           table(head, times) + "\nMost memory in use at once [MiB], in addition to the mesh:\n\n" +
+           table(memoryHead, memory) +
            fmt::format(
                "\nThe serial program clears and reads two grids of the whole box, so that its time grows with the box; "
                "here both time and memory grow with the surface, and no grid runs out of memory (on TBB {:.0f} MiB at "
                "most). "
                "The paper's ratios set all cores of a {} and their vectors against one core without; these, {} threads "
                "or a device's compute units.{}\n",
-               most, published::processor, threads, gpu ? "" : " No GPU was at hand for the Tesla's column.");
+               largest, published::processor, threads, gpu ? "" : " No GPU was at hand for the Tesla's column.");
 }
 
 // Grids of Table 4 where one of ours is slower than one of the paper's, or has a smaller speed-up over the serial
@@ -175,7 +176,7 @@ struct Lag {
         if (paper.tesla) slower(tesla, *paper.tesla);
         if (ratio < papers) gain.push_back(fmt::format("{:.1f} and {:.1f} at {}", ratio, papers, grid));
     }
-    void tell(const std::string& what, std::vector<std::string>& found) const {
+    void describe(const std::string& what, std::vector<std::string>& found) const {
         const auto line = [&](const std::vector<std::string>& list, const std::string& with) {
             if (!list.empty())
                 found.push_back(fmt::format("Table 4, {} and {}: {}.", what, with, fmt::join(list, "; ")));
@@ -194,7 +195,7 @@ std::vector<std::string> behindTable4(const json& data) {
         Lag lag;
         for (std::size_t i = 0; i < published::table4.size(); ++i)
             lag.add(published::table4[i], ours(rows[i]), value(rows[i]["seconds"], "dense"));
-        lag.tell(what, found);
+        lag.describe(what, found);
     };
     for (const auto& [key, name] : onTbb)
         compare(fmt::format("{} on TBB, {} threads,", name, threads),

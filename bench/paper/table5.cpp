@@ -108,11 +108,11 @@ std::vector<std::string> behindTable5(const json& data) {
     std::vector<std::string> found;
     const json& rows = data["rows"];
     const auto growth = [&](const std::string& what, const std::function<double(const json&)>& time) {
-        double most = 0;
-        for (const json& row : rows) most = std::max(most, time(row) / time(rows[0]));
-        if (most > flat)
-            found.push_back(
-                fmt::format("Table 5, {}: {:.2f} times as long for the worst variance as for the first.", what, most));
+        double largest = 0;
+        for (const json& row : rows) largest = std::max(largest, time(row) / time(rows[0]));
+        if (largest > flat)
+            found.push_back(fmt::format("Table 5, {}: {:.2f} times as long for the worst variance as for the first.",
+                                        what, largest));
     };
     for (const auto& [key, name] : onTbb)
         growth(fmt::format("{} on TBB, {} threads", name, threads),

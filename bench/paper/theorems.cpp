@@ -116,8 +116,8 @@ DistanceError aroundWedges(unsigned seed, int trials, double minAngle, double ma
         const double longest = dice.logarithmic(0.1, 2);
         const Wedge wedge(dice.between(minAngle, maxAngle), longest, extent);
         for (int k = 0; k < points; ++k) {
-            const double turn = dice.between(wedge.angle, 2 * pi), radius = dice.between(0.01, farthest);
-            const dvec2 at = radius * dvec2(std::cos(turn), std::sin(turn));
+            const double angle = dice.between(wedge.angle, 2 * pi), radius = dice.between(0.01, farthest);
+            const dvec2 at = radius * dvec2(std::cos(angle), std::sin(angle));
             const dvec3 point(at, dice.between(-wedge.leg, wedge.leg));
             note(worst, wedge.approximate(point, delta) - wedge.distance(at), longest, delta);
         }

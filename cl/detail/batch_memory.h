@@ -1,5 +1,5 @@
 // The device memory of a batch of bricks: its size, its buffers, and the layout of its results.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Divides the bricks of a grid into batches that fit the device's memory.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <cstddef>

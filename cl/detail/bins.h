@@ -1,5 +1,5 @@
 // Bins the triangles of a mesh by brick on a device; kernels in bins.cl.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <cstdint>

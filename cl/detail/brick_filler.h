@@ -1,6 +1,6 @@
 // The methods that fill brick by brick on a device. Triangles are binned into bricks and cut into parts, and blocks are
 // filled from the parts. Bricks stream through the device's memory in batches.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <functional>
@@ -8,6 +8,7 @@
 
 #include <bilayer/cl/filler.h>
 #include "cl/detail/program.h"
+#include "sdf/leaf/blocks.h"
 
 namespace bilayer::detail {
 

@@ -1,5 +1,5 @@
 // Enqueues kernels by name.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include "cl/detail/program.h"

@@ -1,5 +1,5 @@
 // Blocks that a device leaves to the host.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <glm/vec3.hpp>

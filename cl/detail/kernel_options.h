@@ -1,5 +1,5 @@
 // Translates the options of a filler or a field for a device, and holds the constants of all kernels.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <cstddef>

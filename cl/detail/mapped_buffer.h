@@ -1,5 +1,5 @@
 // A device buffer that the host reads in place.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // Device memory within a budget.
-// Tested by tests/cl/field.cpp.
+// Tested by tests/cl/field.cpp through DeviceField.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Waits for the commands of a queue at the end of a scope.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include "cl/detail/program.h"

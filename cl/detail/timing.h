@@ -1,5 +1,5 @@
 // Measures device time by the events of queues.
-// Tested by tests/cl/filler.cpp.
+// Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The transform from the coordinates of one body into those of another.
-// Tested by tests/collider/collide.cpp.
+// The size of a posed body, and the transform from the coordinates of one body into those of another.
+// Tested by tests/collider/collide.cpp through collide().
 #pragma once
 
 #include <bilayer/collider/contact.h>
@@ -10,6 +10,11 @@
 #include "collider/field/field_data.h"
 
 namespace bilayer::detail {
+
+/// The longest side of the bounds of a body's own coordinates, scaled [m].
+inline double sizeOf(const Placed& body) {
+    return double(body.scale) * double(body.collider.bounds().longestSide());
+}
 
 struct BodyTransform {
     glm::mat3 linear;

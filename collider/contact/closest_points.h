@@ -1,5 +1,5 @@
 // Refinement of contacts to the closest points of two surfaces.
-// Tested by tests/collider/collide.cpp.
+// Tested by tests/collider/collide.cpp through collide().
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -2,7 +2,9 @@
 #include <bilayer/collider/contact.h>
 
 #include <algorithm>
+#include <memory>
 #include <optional>
+#include <utility>
 
 #include "collider/contact/closest_points.h"
 #include "collider/contact/collider_data.h"
@@ -111,6 +113,16 @@ ContactReport collideFound(const Placed& a, const Placed& b, const ContactOption
 namespace bilayer {
 
 using namespace detail;
+
+PointSampler::PointSampler(DeviceSampler sampler) : data_(std::make_shared<const DeviceSampler>(std::move(sampler))) {}
+
+const std::string& PointSampler::backend() const {
+    return data_->backend;
+}
+
+const std::string& PointSampler::device() const {
+    return data_->device;
+}
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
                       ContactCache* cache) {

@@ -5,6 +5,7 @@
 #include <bilayer/collider/collider.h>
 
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -20,6 +21,9 @@ namespace bilayer::detail {
 
 /// Builds the body of a mesh and its level set, as Collider's constructor does.
 Body makeBody(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options);
+
+/// The same samples with a mesh, whose triangles then decide near the surface.
+Field fieldWithMesh(const Field& samples, std::shared_ptr<const Mesh> mesh);
 
 struct ColliderData {
     ColliderData(const LevelSet& levelSet, Body body);

@@ -1,5 +1,5 @@
 // The field of the other body of a pair, as the contact search queries it.
-// Tested by tests/collider/collide.cpp.
+// Tested by tests/collider/collide.cpp through collide().
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -8,8 +8,6 @@ namespace bilayer::detail {
 
 namespace {
 
-// Normals within about 25 degrees form one patch: flat enough for four points to carry it.
-constexpr float sameDirection = 0.9f;
 // Normals of a patch that continues from the last step stay within about 32 degrees. Its direction is that of the kept
 // contacts, and jitters with them; the grouping of the contacts must not.
 constexpr float continuedDirection = 0.85f;

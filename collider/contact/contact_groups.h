@@ -1,5 +1,5 @@
 // Groups of contacts with similar normals: the contact patches before their reduction.
-// Tested by tests/bullet/contact_reduction.cpp.
+// Tested by tests/bullet/contact_reduction.cpp through reduce().
 #pragma once
 
 #include <bilayer/collider/contact.h>
@@ -13,6 +13,10 @@
 #include "collider/contact/contact_reduction.h"
 
 namespace bilayer::detail {
+
+/// Normals within about 25 degrees form one patch, flat enough for four points to carry it. A new contact continues an
+/// old one within this angle.
+inline constexpr float sameDirection = 0.9f;
 
 /// Contacts of one patch, as indices in ascending order of the remaining distance.
 using ContactGroup = std::vector<std::uint32_t>;

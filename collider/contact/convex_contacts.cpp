@@ -1,5 +1,5 @@
 // Contacts between a field and convex shapes.
-// Tested by tests/bullet/edges.cpp.
+// Tested by tests/bullet/edges.cpp through collideConvex().
 #include <bilayer/collider/contact.h>
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // The nearest point of a convex shape's surface, casts against it, and its curvature there.
-// Tested by tests/bullet/convex.cpp.
+// Tested by tests/bullet/convex.cpp through Convex.
 #include <algorithm>
 #include <array>
 #include <cmath>

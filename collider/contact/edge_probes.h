@@ -1,5 +1,5 @@
 // Probes: the points of an edge or a face at which another body's field is sampled.
-// Tested by tests/bullet/edges.cpp.
+// Tested by tests/bullet/edges.cpp through collideConvex().
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // Contacts of a body's sharp edges between its surface points, in the field of another body.
-// Tested by tests/collider/sharp_edges.cpp.
+// Tested by tests/bullet/edges.cpp through collideFields().
 #pragma once
 
 #include <algorithm>

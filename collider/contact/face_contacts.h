@@ -1,5 +1,5 @@
 // Contacts of a field's surface points with the faces of triangles.
-// Tested by tests/bullet/sliding.cpp.
+// Tested by tests/bullet/sliding.cpp through bullet::Shape.
 #pragma once
 
 #include <bilayer/collider/contact.h>

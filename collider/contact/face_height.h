@@ -1,5 +1,5 @@
 // Whether the height of a field's surface point over a triangle is the exact distance of the two.
-// Tested by tests/bullet/sliding.cpp.
+// Tested by tests/bullet/sliding.cpp through bullet::Shape.
 #pragma once
 
 #include <glm/vec3.hpp>

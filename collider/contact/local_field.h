@@ -1,6 +1,6 @@
 // A field from the view of the other body of a pair: in metres, in the field's axes, with the relative motion of the
 // other body.
-// Tested by tests/bullet/edges.cpp.
+// Tested by tests/bullet/edges.cpp through collideConvex().
 #pragma once
 
 #include <cstdint>

@@ -227,6 +227,7 @@ class PairSearch {
 
     void measureLeaves(std::uint32_t a, std::uint32_t b) {
         const LeafTriangles &ofA = leavesA_.of(a_, a), &ofB = leavesB_.of(b_, b);
+        // a copy: measure() changes the direction, and the limits of this leaf must keep to one
         const auto along = [direction = direction_](const TriangleCorners& c) {
             return std::array{glm::dot(direction, c[0]), glm::dot(direction, c[1]), glm::dot(direction, c[2])};
         };

@@ -1,5 +1,5 @@
 // The distance between two triangle meshes.
-// Tested by tests/collider/distance.cpp.
+// Tested by tests/collider/distance.cpp through distance().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The relative motion of two bodies.
-// Tested by tests/collider/collide.cpp.
+// Tested by tests/collider/collide.cpp through collide().
 #pragma once
 
 #include <glm/geometric.hpp>

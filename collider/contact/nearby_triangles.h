@@ -1,5 +1,5 @@
 // The triangles of an open surface near a field.
-// Tested by tests/bullet/sliding.cpp.
+// Tested by tests/bullet/sliding.cpp through bullet::Shape.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The distance of a point from a triangle.
-// Tested by tests/bullet/convex.cpp.
+// Tested by tests/bullet/convex.cpp through Convex.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // The hierarchy of a mesh placed in a frame that it shares with another mesh.
-// Tested by tests/collider/distance.cpp.
+// Tested by tests/collider/distance.cpp through distance().
 #pragma once
 
 #include <algorithm>
@@ -94,7 +94,7 @@ class PosedTree {
         return {posed(mesh.points[t.x]), posed(mesh.points[t.y]), posed(mesh.points[t.z])};
     }
 
-    // The triangle nearest to a point of the common frame, and its closest point.
+    /// The triangle nearest to a point of the common frame, and its closest point.
     std::pair<std::uint32_t, glm::dvec3> nearest(const glm::dvec3& point) const {
         const glm::dvec3 at = mesh_.approached(map_.inverse(point));
         const std::uint32_t triangle = mesh_.nearest(at, std::numeric_limits<float>::infinity());
@@ -102,7 +102,7 @@ class PosedTree {
         return {triangle, map_(at + mesh_.featureOf(triangle, at).offset)};
     }
 
-    // The squared size of a node's box, to compare nodes by.
+    /// The squared size of a node's box, to compare nodes by.
     double size2Of(const PosedNode& node) const {
         glm::dvec3 half(tree().size);
         if (node.group)

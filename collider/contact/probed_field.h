@@ -1,5 +1,5 @@
 // A field that is collided with the triangles of an open surface, and the lengths of the search.
-// Tested by tests/bullet/sliding.cpp.
+// Tested by tests/bullet/sliding.cpp through bullet::Shape.
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -34,11 +34,11 @@ std::optional<std::size_t> SampledPairs::add(const Placed& a, const Placed& b, f
 bool SampledPairs::sample() {
     if (queries_.empty()) return true;
     try {
-        sampler_.sample(bodies_, queries_, found_);
+        sampler_.data().sample(bodies_, queries_, found_);
         return true;
     } catch (const std::exception& error) {
-        fmt::print(stderr, "bilayer: contacts are found by the processor from now on, not by {}: {}\n", sampler_.device,
-                   error.what());
+        fmt::print(stderr, "bilayer: contacts are found by the processor from now on, not by {}: {}\n",
+                   sampler_.device(), error.what());
         sampler_ = {};
         return false;
     }

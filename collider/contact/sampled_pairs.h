@@ -20,7 +20,7 @@ class SampledPairs {
     explicit SampledPairs(PointSampler sampler) : sampler_(std::move(sampler)) {}
 
     /// Whether there is a sampler that works.
-    bool works() const { return static_cast<bool>(sampler_.sample); }
+    bool works() const { return static_cast<bool>(sampler_); }
 
     /// Begins a step.
     void clear();

@@ -1,5 +1,4 @@
-// Batch sampling of the points of many bodies in each other's fields, as a device can do it. A sampler is a function
-// object that its user calls, as a BlockFiller is.
+// Batch sampling of the points of many bodies in each other's fields, as a device can do it.
 // Tested by tests/bullet/sampled_pairs.cpp.
 #pragma once
 
@@ -62,6 +61,14 @@ class FoundPoints {
 
     std::vector<FoundPoint> points;     ///< grouped by query
     std::vector<std::uint32_t> begins;  ///< the first point of each query, and the end
+};
+
+/// What a PointSampler holds.
+struct DeviceSampler {
+    std::string backend;  ///< "opencl"
+    std::string device;   ///< the device's name
+    /// Throws on device errors; the next call may succeed.
+    std::function<void(std::span<const SampledBody>, std::span<const PointQuery>, FoundPoints&)> sample;
 };
 
 }  // namespace bilayer::detail

@@ -14,7 +14,7 @@ namespace {
 // them remains where points are two voxels apart.
 constexpr float maxNeighbourDistance = 4.5f;
 // Of two neighbours in about the same direction, only the nearer one counts: cosine of 60 degrees.
-constexpr float sameDirection = 0.5f;
+constexpr float minNeighbourCosine = 0.5f;
 // Max cosine between an edge and the normals at its ends. An edge is perpendicular to them except at vertices: a
 // cube's have 0.58.
 constexpr float maxNormalCosine = 0.7f;
@@ -75,7 +75,9 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
     });
     std::vector<Neighbour> kept;
     for (const Neighbour& next : candidates) {
-        const auto hides = [&](const Neighbour& k) { return glm::dot(k.direction, next.direction) > sameDirection; };
+        const auto hides = [&](const Neighbour& k) {
+            return glm::dot(k.direction, next.direction) > minNeighbourCosine;
+        };
         if (kept.size() == maxNeighbours) break;
         if (std::any_of(kept.begin(), kept.end(), hides)) continue;
         const glm::vec3 middle = 0.5f * (point.position + points.points()[next.index].position);

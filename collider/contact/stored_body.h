@@ -1,5 +1,5 @@
 // Conversions and checks that the parts of a stored body share.
-// Tested by tests/collider/body.cpp.
+// Tested by tests/collider/body.cpp through withBody().
 #pragma once
 
 #include <openvdb/Types.h>

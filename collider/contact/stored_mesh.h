@@ -1,5 +1,5 @@
 // Storage of a body's mesh as a metadata entry of the distance grid.
-// Tested by tests/collider/body.cpp.
+// Tested by tests/collider/body.cpp through withBody().
 #pragma once
 
 #include <bilayer/sdf/mesh.h>

@@ -1,5 +1,5 @@
 // Storage of a body's surface points as a grid of OpenVDB points.
-// Tested by tests/collider/body.cpp.
+// Tested by tests/collider/body.cpp through withBody().
 #pragma once
 
 #include <bilayer/sdf/level_set.h>

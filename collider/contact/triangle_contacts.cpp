@@ -1,5 +1,5 @@
 // Contacts between a field and the triangles of an open surface.
-// Tested by tests/bullet/open_surface.cpp.
+// Tested by tests/bullet/open_surface.cpp through collideTriangles().
 #include <bilayer/collider/contact.h>
 
 #include <algorithm>

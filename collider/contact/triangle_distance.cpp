@@ -11,9 +11,6 @@ namespace bilayer::detail {
 
 namespace {
 
-/// Squared sine of the angle below which segments are treated as parallel.
-constexpr double parallel2 = 1e-20;
-
 struct SegmentPair {
     double s, t;  // parameters along the two segments, in [0, 1]
     double distance2;
@@ -29,7 +26,8 @@ SegmentPair closestOnSegments(const glm::dvec3& p, const glm::dvec3& u, const gl
     const double uu = glm::dot(u, u), vv = glm::dot(v, v), uv = glm::dot(u, v);
     const double ur = glm::dot(u, r), vr = glm::dot(v, r);
     const double determinant = uu * vv - uv * uv;
-    double s = determinant > parallel2 * uu * vv ? std::clamp((uv * vr - ur * vv) / determinant, 0.0, 1.0) : 0.0;
+    // of parallel segments any s will do: t, and s again, are then the best
+    double s = dividedIn01(uv * vr - ur * vv, determinant);
     const double t = dividedIn01(uv * s + vr, vv);
     s = dividedIn01(uv * t - ur, uu);
     const glm::dvec3 between = r + s * u - t * v;

@@ -1,5 +1,4 @@
 // The closest points of two triangles.
-// Tested by tests/collider/distance.cpp.
 #pragma once
 
 #include <cstdint>

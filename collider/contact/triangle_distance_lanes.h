@@ -1,6 +1,6 @@
 // The squared distances from one triangle to several, one in each SIMD lane. Highway includes this file once for each
 // instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/collider/distance.cpp.
+// Tested by tests/collider/triangle_distance.cpp.
 #if defined(BILAYER_COLLIDER_TRIANGLE_DISTANCE_LANES_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_COLLIDER_TRIANGLE_DISTANCE_LANES_H
 #undef BILAYER_COLLIDER_TRIANGLE_DISTANCE_LANES_H

@@ -1,5 +1,5 @@
 // The face of a triangle: its plane, and where points are over it.
-// Tested by tests/bullet/sliding.cpp.
+// Tested by tests/bullet/sliding.cpp through bullet::Shape.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // Checks of batch queries.
-// Tested by tests/collider/field.cpp.
+// Tested by tests/collider/field.cpp through Field::sample().
 #pragma once
 
 #include <cstddef>

@@ -1,7 +1,7 @@
 // Overlaps of boxes with the triangles of a mesh. SIMD tests in single precision reject triangles conservatively;
 // double precision and the mesh's own vertices decide (triangle_tests.h). May run on any number of threads at once, and
 // allocates nothing.
-// Tested by tests/collider/field_overlaps.cpp.
+// Tested by tests/collider/field_overlaps.cpp through Field::overlapsBox().
 #pragma once
 
 #include "collider/field/mesh_tree.h"

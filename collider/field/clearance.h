@@ -1,5 +1,5 @@
 // A coarse distance bound for places far from a field's surface.
-// Tested by tests/collider/field_rays.cpp.
+// Tested by tests/collider/field_rays.cpp through Field::raycast().
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ class Clearance {
         const std::int8_t* centres;  ///< min distance from each cell's centre to the surface, negative inside [steps]
         const std::int8_t* minima;   ///< lower bound of the samples in each cell, by stored block [minimaStep]
         float minimaStep;            ///< [m]
-        float besides[2];            ///< the same for cells of empty blocks, outside and inside [m]
+        float ofEmptyBlocks[2];      ///< the same for cells of empty blocks, outside and inside [m]
         glm::ivec3 blocks;           ///< count along each axis
     };
 
@@ -55,7 +55,7 @@ class Clearance {
     bool isAbove(const glm::vec3& point, float reach) const noexcept {
         const glm::ivec3 part = partOf(point);
         const std::int32_t block = data_.directory[entryOf(part)];
-        if (block < 0) return data_.besides[-1 - block] > reach;
+        if (block < 0) return data_.ofEmptyBlocks[-1 - block] > reach;
         return float(data_.minima[std::size_t(block) * blockParts + inBlock(part)]) * data_.minimaStep > reach;
     }
 

@@ -30,12 +30,12 @@ constexpr SquaredSteps squaredStepsTo(int d) {
 
 // Lowers squared distances to those of others plus an increment. Returns false if no larger increment can lower any.
 bool lower(SquaredSteps* squares, const SquaredSteps* others, std::size_t count, SquaredSteps more) {
-    SquaredSteps most = 0;
+    SquaredSteps largest = 0;
     for (std::size_t i = 0; i < count; ++i) {
-        most = std::max(most, squares[i]);
+        largest = std::max(largest, squares[i]);
         squares[i] = std::min(squares[i], SquaredSteps(others[i] + more));
     }
-    return most > more;
+    return largest > more;
 }
 
 // Lowers each squared distance along the last axis to the minimum of the others plus their increments (as P.

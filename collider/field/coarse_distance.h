@@ -1,5 +1,5 @@
 // The distances of a field's coarse cells to the surface, for Clearance.
-// Tested by tests/collider/field.cpp.
+// Tested by tests/collider/field.cpp through Field::sample().
 #pragma once
 
 #include <array>

@@ -2,7 +2,7 @@
 // voxels from the directory's first voxel, bounds in metres. Highway includes this file once for each instruction set:
 // only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h. The functions round down, which most
 // instruction sets do in one instruction; the baseline calls a function for it.
-// Tested by tests/collider/field.cpp.
+// Tested by tests/collider/field.cpp through Field::sample().
 #if defined(BILAYER_COLLIDER_DISTANCE_BOUNDS_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_COLLIDER_DISTANCE_BOUNDS_H
 #undef BILAYER_COLLIDER_DISTANCE_BOUNDS_H

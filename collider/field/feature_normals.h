@@ -1,7 +1,7 @@
 // The pseudonormals of a mesh's edges and vertices: J. A. Baerentzen, H. Aanaes, "Signed distance computation using the
 // angle weighted pseudonormal", IEEE TVCG 11 (2005) 243-253. Vertices with equal coordinates count as one. Duplicate
 // triangles count once, and triangles without area are ignored.
-// Tested by tests/collider/field_closest.cpp.
+// Tested by tests/collider/field_closest.cpp through Field::closest().
 #pragma once
 
 #include <hwy/cache_control.h>

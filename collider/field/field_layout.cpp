@@ -243,7 +243,7 @@ Clearance FieldLayout::clearance() const {
                       .centres = centres.data(),
                       .minima = minima.data(),
                       .minimaStep = minimaStepOf(*this),
-                      .besides = {exteriorWidth, -interiorWidth},
+                      .ofEmptyBlocks = {exteriorWidth, -interiorWidth},
                       .blocks = blocks});
 }
 

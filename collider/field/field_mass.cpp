@@ -10,7 +10,7 @@
 //   sphere, 64, 128, 256         1.1e-3, 2.8e-4, 7.0e-5     5.0e-4, 1.2e-4, 3.1e-5     6.9e-6, 1.2e-6, 1.6e-7
 //   dragon, 64, 128, 256         2.0e-2, 5.3e-3, 1.4e-3     1.1e-2, 2.6e-3, 6.3e-4     2.5e-4, 2.2e-5, 1.2e-5
 //   44 meshes, 128, median       2.9e-3                     1.1e-3                     6.3e-5
-// Tested by tests/collider/mass.cpp.
+// Tested by tests/collider/mass.cpp through massProperties().
 #include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/parallel_sort.h>
 

@@ -1,7 +1,7 @@
 // Field sampling, single and in batches. cl/kernels/field.cl samples in the same way, operation by operation. Voxels
 // outside the band are NaN, which propagates to the result. Highway compiles the part between HWY_BEFORE_NAMESPACE and
 // HWY_AFTER_NAMESPACE once for each instruction set. All of them give the same bytes.
-// Tested by tests/collider/field.cpp.
+// Tested by tests/collider/field.cpp through Field::sample().
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "collider/field/field_sample.cpp"
 #include <hwy/foreach_target.h>

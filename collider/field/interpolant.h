@@ -1,10 +1,11 @@
 // Error bounds of a field's interpolated distances; internal.
-// Tested by tests/collider/zero_set.cpp.
+// Tested by tests/collider/zero_set.cpp through Field::raycast().
 #pragma once
 
 namespace bilayer::detail {
 
-/// The diagonal of a cell, and the Lipschitz constant of the trilinear interpolant [voxels].
+/// The diagonal of a cell, and the Lipschitz constant of the trilinear interpolant [voxels]. A point is in the band if
+/// the eight voxels around it are.
 inline constexpr float cellDiagonal = 1.7320508f;
 
 /// Max error of the interpolated distance to either side [voxels]. The mean distance to the eight voxels around a point

@@ -1,5 +1,5 @@
 // A step of C. G. J. Jacobi's method for the eigenvectors of a symmetric matrix.
-// Tested by tests/collider/mass.cpp.
+// Tested by tests/collider/mass.cpp through massProperties().
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // Blocks of 9^3 distances: an OpenVDB leaf, and the first layer of voxels of its seven upper neighbours.
-// Tested by tests/collider/field.cpp.
+// Tested by tests/collider/field.cpp through Field::sample().
 #pragma once
 
 #include "sdf/base/openvdb.h"

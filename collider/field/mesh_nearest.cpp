@@ -1,6 +1,6 @@
 // Closest-triangle search by branch and bound, nearest box first: N. Roussopoulos, S. Kelley, F. Vincent, "Nearest
 // neighbor queries", SIGMOD 1995, 71-79. Highway compiles it once for each instruction set.
-// Tested by tests/collider/field_closest.cpp.
+// Tested by tests/collider/field_closest.cpp through Field::closest().
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "collider/field/mesh_nearest.cpp"
 #include <hwy/cache_control.h>
@@ -126,15 +126,15 @@ class NearestSearch {
         const WideLeaf& leaf = tree_->leaves[index];
         const Tag tag;
         alignas(64) float distance2[treeWidth];
-        Vec least = hn::Set(tag, std::numeric_limits<float>::infinity());
+        Vec smallest = hn::Set(tag, std::numeric_limits<float>::infinity());
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
             const auto from = [&](int k) { return point_.from(leaf, load, k); };
             const Vec measured = measureFromCorner(leaf, load, from(0), from(1), from(2)).distance2;
             hn::Store(measured, tag, distance2 + i);
-            least = hn::Min(least, measured);
+            smallest = hn::Min(smallest, measured);
         }
-        const Vec nearest = hn::MinOfLanes(tag, least);
+        const Vec nearest = hn::MinOfLanes(tag, smallest);
         unsigned found = 0;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag))
             found |= bitsOf(hn::Eq(hn::Load(tag, distance2 + i), nearest)) << i;
@@ -218,14 +218,14 @@ class EntrySearch {
         key_ = nextKey_;
         const Ints tag;
         const auto last = hn::Set(tag, nextKey_), none = hn::Set(tag, noKey);
-        auto least = none;
+        auto smallest = none;
         for (std::size_t i = 0; i < vectors_; ++i) {
             const auto keys = hn::Load(tag, keys_ + i * lanes);
             const auto left = hn::IfThenElse(hn::Eq(keys, last), none, keys);
             hn::Store(left, tag, keys_ + i * lanes);
-            least = hn::Min(least, left);
+            smallest = hn::Min(smallest, left);
         }
-        nextKey_ = hn::GetLane(hn::MinOfLanes(tag, least));
+        nextKey_ = hn::GetLane(hn::MinOfLanes(tag, smallest));
         if (isNear(nextKey_)) search_.fetchNode(nodeOf(nextKey_));
     }
 

@@ -105,12 +105,12 @@ class RaySearch {
         const Vec y = upright(det(dot(q, b), dot(d, b), height, fall)), along = upright(hn::Neg(height));
 
         const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
-        const Vec besideBC = det(bcx, bcy, hn::Sub(x, hn::Mul(load(leaf.lengthAB), steep)), y);
-        const Vec besideAC = det(x, y, load(leaf.directionAC[0]), load(leaf.directionAC[1]));
+        const Vec acrossBC = det(bcx, bcy, hn::Sub(x, hn::Mul(load(leaf.lengthAB), steep)), y);
+        const Vec acrossAC = det(x, y, load(leaf.directionAC[0]), load(leaf.directionAC[1]));
         // the sum of the coordinates is an upper bound of the distance
         const Vec away = hn::Add(hn::Add(hn::Abs(q[0]), hn::Abs(q[1])), hn::Abs(q[2]));
         const Vec room = hn::Add(hn::Mul(hn::Set(tag, passRounding), away), hn::Set(tag, passTolerance));
-        const Vec inside = hn::Min(hn::Min(y, along), hn::Min(besideBC, besideAC));
+        const Vec inside = hn::Min(hn::Min(y, along), hn::Min(acrossBC, acrossAC));
         return bitsOf(hn::And(hn::Ge(hn::Add(inside, room), hn::Zero(tag)),
                               hn::Le(along, hn::Add(hn::Mul(hn::Set(tag, limit_), steep), room))));
     }

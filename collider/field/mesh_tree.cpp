@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "collider/field/path.h"
+#include "sdf/base/triangle_corners.h"
 
 namespace bilayer::detail {
 namespace {
@@ -18,9 +19,6 @@ namespace {
 constexpr double longestEdge = 16;
 /// Thinner triangles have no reliable normal [voxels].
 constexpr double thinnest = 1e-7;
-/// Min height relative to the longest edge. Flatter triangles use their edges, which are at least as accurate as the
-/// projection onto the plane.
-constexpr double flatness = 1e-10;
 /// Points farther from the mesh than `farthest` are replaced by points of the same direction at `farEnough` [mesh
 /// sizes]. There, single precision is off by a thousandth of a size, and the change of direction to off-centre features
 /// by half as much. Both are less than a millionth of the distance of points beyond `farthest`.
@@ -86,11 +84,11 @@ NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& poi
     const glm::dvec3 from = toTree(point) - vectorOf(leaf.cell) - vectorOf(leaf.corner);
     const glm::dvec3 along = vectorOf(leaf.along), normal = vectorOf(leaf.normal);
     const double x = glm::dot(from, along), y = glm::dot(from, glm::cross(normal, along)), z = glm::dot(from, normal);
-    const double besideBC = double(leaf.directionBC[0][i]) * y -
+    const double acrossBC = double(leaf.directionBC[0][i]) * y -
                             double(leaf.directionBC[1][i]) * (x - double(leaf.lengthAB[i])),
-                 besideAC = double(leaf.directionAC[1][i]) * x - double(leaf.directionAC[0][i]) * y;
+                 acrossAC = double(leaf.directionAC[1][i]) * x - double(leaf.directionAC[0][i]) * y;
     const double room = roomAt(point) * perMetre_;
-    const bool over = std::min({y, besideBC, besideAC}) > room && std::abs(z) < near;
+    const bool over = std::min({y, acrossBC, acrossAC}) > room && std::abs(z) < near;
     if (!over || normals_.isFlat(triangle)) return featureOf(triangle, point);
     return {.triangle = triangle,
             .offset = (-z * double(voxelSize_)) * normal,
@@ -132,7 +130,7 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
         std::max({glm::dot(edges[0], edges[0]), glm::dot(edges[1], edges[1]), glm::dot(edges[2], edges[2])});
     NearestFeature found{.triangle = triangle};
     const auto inside = [&](std::size_t i) { return glm::dot(glm::cross(c[i], edges[i]), n) >= 0; };
-    if (n2 > flatness * flatness * longest2 * longest2 && inside(0) && inside(1) && inside(2)) {
+    if (n2 > minRelativeHeight * minRelativeHeight * longest2 * longest2 && inside(0) && inside(1) && inside(2)) {
         found.offset = (glm::dot(c[0], n) / n2) * n;
         if (!normals_.isFlat(triangle)) found.normal = n / std::sqrt(n2);
     } else {

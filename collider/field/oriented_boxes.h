@@ -2,7 +2,7 @@
 // of its triangles. Pieces of a smooth surface are flat in such boxes, so the distance bounds are tight. Axis-aligned
 // boxes of slanted pieces are loose, and searches would open them in vain. After S. Gottschalk, M. C. Lin, D. Manocha,
 // "OBBTree", SIGGRAPH 1996, 171-180.
-// Tested by tests/collider/field_closest.cpp.
+// Tested by tests/collider/field_closest.cpp through Field::closest().
 #pragma once
 
 #include <cstddef>

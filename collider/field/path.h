@@ -1,5 +1,5 @@
 // Straight paths in double precision; internal.
-// Tested by tests/collider/field_rays.cpp.
+// Tested by tests/collider/field_rays.cpp through Field::raycast().
 #pragma once
 
 #include <algorithm>

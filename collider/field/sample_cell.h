@@ -1,7 +1,7 @@
 // The eight voxels around a place, and their trilinear interpolation in two vectors of four: along x first, then y,
 // then z. The gradient is a by-product. Highway includes this file once for each instruction set: only between
 // HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/collider/field.cpp.
+// Tested by tests/collider/field.cpp through Field::sample().
 #if defined(BILAYER_COLLIDER_SAMPLE_CELL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_COLLIDER_SAMPLE_CELL_H
 #undef BILAYER_COLLIDER_SAMPLE_CELL_H

@@ -1,7 +1,7 @@
 // Places in a field as fixed-point numbers. The upper word of a number is the block; its lower word is the voxel in the
 // block and the fraction to the next voxel. Highway includes this file once for each instruction set: only between
 // HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/collider/field.cpp.
+// Tested by tests/collider/field.cpp through Field::sample().
 #if defined(BILAYER_COLLIDER_SAMPLE_PLACE_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_COLLIDER_SAMPLE_PLACE_H
 #undef BILAYER_COLLIDER_SAMPLE_PLACE_H

@@ -1,7 +1,7 @@
 // The vectors of field samples, in the compiler's own types, with loads, conversions and shuffles. Highway includes
 // this file once for each instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after
 // hwy/highway.h.
-// Tested by tests/collider/field.cpp.
+// Tested by tests/collider/field.cpp through Field::sample().
 #if defined(BILAYER_COLLIDER_SAMPLE_VECTORS_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_COLLIDER_SAMPLE_VECTORS_H
 #undef BILAYER_COLLIDER_SAMPLE_VECTORS_H

@@ -1,7 +1,7 @@
 // Sphere casts against a mesh; internal. Empty space is crossed by sphere tracing (J. C. Hart, "Sphere tracing", The
 // Visual Computer 12 (1996) 527-545). Near the mesh, each section of the path is tested against the triangles exactly.
 // A sphere that grazes the surface thus takes no more steps than there are sections.
-// Tested by tests/collider/field_rays.cpp.
+// Tested by tests/collider/field_rays.cpp through Field::sphereCast().
 #pragma once
 
 #include <algorithm>

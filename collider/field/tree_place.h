@@ -1,6 +1,6 @@
 // Places in the frame of a mesh's tree, and their distances to the triangles of its leaves. Highway includes this file
 // once for each instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/collider/mesh_rays.cpp.
+// Tested by tests/collider/mesh_rays.cpp through MeshTree.
 #if defined(BILAYER_COLLIDER_TREE_PLACE_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_COLLIDER_TREE_PLACE_H
 #undef BILAYER_COLLIDER_TREE_PLACE_H

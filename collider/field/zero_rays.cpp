@@ -2,7 +2,7 @@
 // voxel traversal algorithm for ray tracing", Eurographics 1987, 3-10). Along a path the interpolant of a cell is a
 // cubic, monotone between its extrema (H. Hansson-Soederlund, A. Evans, T. Akenine-Moeller, "Ray tracing of signed
 // distance function grids", JCGT 11 (2022) 94-113).
-// Tested by tests/collider/zero_set.cpp.
+// Tested by tests/collider/zero_set.cpp through Field::raycast().
 #include <algorithm>
 #include <array>
 #include <cmath>

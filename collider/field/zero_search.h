@@ -1,7 +1,7 @@
 // Branch and bound over the zero set of a field's interpolant: over the cubes of the directory, most of which are
 // rejected by their clearances, then cells, then their octants. Lengths in voxels, places from the directory's first
 // voxel.
-// Tested by tests/collider/zero_set.cpp.
+// Tested by tests/collider/zero_set.cpp through Field::closest().
 #pragma once
 
 #include <algorithm>

@@ -29,7 +29,7 @@ double boxDistance(const glm::dvec3& point, const glm::dvec3& lower, const glm::
 // direction.
 struct Separation {
     glm::dvec3 direction;
-    double least;
+    double smallest;
 };
 
 // Lagrangian dual of the distance to the box within the slab. The multiplier is found by tangents; the bound holds for
@@ -83,7 +83,7 @@ struct NearestQuery {
     }
     double bound(const glm::dvec3& lower, const glm::dvec3& upper) const { return boxDistance(point, lower, upper); }
     double bound(const glm::dvec3& lower, const glm::dvec3& upper, const LinearBound& linear) const {
-        return std::max(bound(lower, upper), separation(point, lower, upper, linear).least);
+        return std::max(bound(lower, upper), separation(point, lower, upper, linear).smallest);
     }
     void offer(const glm::dvec3& zero) { settle(glm::distance(point, zero), zero); }
     void settle(double key, const glm::dvec3& zero) {
@@ -119,7 +119,7 @@ struct SphereCastQuery {
         double along = 0;
         for (int i = 0; i < maxTangents; ++i) {
             const Separation found = separate(path.at(along));
-            const double left = found.least - radius;
+            const double left = found.smallest - radius;
             if (!(left > 0)) break;
             const double approach = glm::dot(found.direction, path.direction);
             if (!(approach > 0)) return infinity;

@@ -51,7 +51,7 @@ constexpr float pulledBack = 0.5f, restingFriction = 1.5f;
 
 constexpr double maxOverlap = 0.5;  // of 99 % of the penetrations [voxels]
 constexpr double maxRise = 1;       // of energy, relative to the peak kinetic energy [%]
-constexpr double maxCreep = 1;      // drift while kept awake [voxels]
+constexpr double maxDrift = 1;      // drift while kept awake [voxels]
 
 constexpr Look bowlLook{.colour = 0x35506b, .roughness = 0.45f, .clearcoat = 0.6f};
 constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9db4d6, 0xe8a598, 0xc9b1d9, 0x7fb7be};
@@ -97,9 +97,9 @@ std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const Thing>>& th
     for (std::size_t i = 0; i < std::size_t(options.bodies); ++i) {
         const std::size_t layer = i / places.size();
         const glm::vec2 place = places[i % places.size()];
-        const float radius = place.x, turn = place.y + 0.6f * float(layer);
+        const float radius = place.x, angle = place.y + 0.6f * float(layer);
         const float x = normal(random), y = normal(random), z = normal(random), w = normal(random);
-        const glm::vec3 at(radius * std::cos(turn), radius * std::sin(turn), apart * float(layer));
+        const glm::vec3 at(radius * std::cos(angle), radius * std::sin(angle), apart * float(layer));
         const glm::quat rotation = glm::normalize(glm::quat(w, x, y, z));
         poses.push_back({at - rotation * middles[i % things.size()], rotation});
     }
@@ -118,13 +118,14 @@ std::vector<glm::vec3> centresOf(const std::vector<btRigidBody*>& bodies) {
 }
 
 // Keeps all bodies awake for a time, and returns the max drift of any body [m].
-double creep(Stage& stage, const std::vector<btRigidBody*>& bodies, double seconds) {
+double drift(Stage& stage, const std::vector<btRigidBody*>& bodies, double seconds) {
     const std::vector<glm::vec3> before = centresOf(bodies);
     for (btRigidBody* body : bodies) body->forceActivationState(DISABLE_DEACTIVATION);
     stage.run(stage.time() + seconds);
-    double most = 0;
-    for (std::size_t i = 0; i < bodies.size(); ++i) most = worse(most, glm::distance(before[i], centreOf(*bodies[i])));
-    return most;
+    double largest = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        largest = worse(largest, glm::distance(before[i], centreOf(*bodies[i])));
+    return largest;
 }
 
 std::string describe(const Thing& thing) {
@@ -173,7 +174,7 @@ Outcome bowl(const BowlOptions& options) {
     stage.run(options.seconds, [&] { return stage.allAsleep(); });
     const int awake = stage.world().moving() - stage.world().asleep();
     stage.run(stage.time() + lastLook);
-    const double crept = options.hold > 0 ? creep(stage, bodies, options.hold) : 0;
+    const double drifted = options.hold > 0 ? drift(stage, bodies, options.hold) : 0;
     const float rim = radius * std::sin(bowlOpening);
     const auto left = std::count_if(bodies.begin(), bodies.end(), [&](const btRigidBody* body) {
         const glm::vec3 at = centreOf(*body);
@@ -197,7 +198,7 @@ Outcome bowl(const BowlOptions& options) {
                         {"99 in 100 penetrations", outcome.usuallyBelow() / voxel, maxOverlap, "voxels"},
                         {"energy rises by", 100 * outcome.energies.rise(), maxRise, "%"}};
     if (options.hold > 0)
-        outcome.criteria.push_back({fmt::format("creep in {:g} s", options.hold), crept / voxel, maxCreep, "voxels"});
+        outcome.criteria.push_back({fmt::format("drift in {:g} s", options.hold), drifted / voxel, maxDrift, "voxels"});
     return outcome;
 }
 

@@ -85,27 +85,27 @@ Outcome chain(const ChainOptions& options) {
         const float size = isLast ? bobSize : 1;
         if (i > 0) height -= above + size * (major - minor);
         above = size * (major - minor);
-        const glm::quat turn = glm::angleAxis(i % 2 * glm::half_pi<float>(), glm::vec3(0, 0, 1));
+        const glm::quat rotation = glm::angleAxis(i % 2 * glm::half_pi<float>(), glm::vec3(0, 0, 1));
         const float mass = i == 0 ? 0 : isLast ? options.bob * linkMass : linkMass;
         const Look look = isLast ? bobLook : Look{.colour = linkColours[i % 2], .roughness = 0.3f, .metalness = 0.3f};
-        btRigidBody& body = stage.add(isLast ? bob : link, {.mass = mass}, {{0, 0, height}, turn * upright}, look);
+        btRigidBody& body = stage.add(isLast ? bob : link, {.mass = mass}, {{0, 0, height}, rotation * upright}, look);
         if (isLast) body.setLinearVelocity({options.push, 0, 0});
         if (mass > 0) body.setActivationState(DISABLE_DEACTIVATION);
     }
     stage.run(options.seconds);
 
     const auto& frames = stage.frames();
-    int most = 0;
+    int largest = 0;
     double longest = 0;
     for (const auto& poses : frames) {
-        most = std::max(most, parted(frames.front(), poses));
+        largest = std::max(largest, parted(frames.front(), poses));
         longest = worse(longest, lengthOf(poses) / lengthOf(frames.front()) - 1);
     }
     Outcome outcome = stage.finish({.target = {0, 0, height + 3 * major},
                                     .distance = 26 * major,
                                     .elevation = -0.14f,
                                     .groundHeight = height - 0.5f});
-    outcome.criteria = {{"links that parted", double(most), 0}, {"stretch", 100 * longest, maxStretch, "%"}};
+    outcome.criteria = {{"links that parted", double(largest), 0}, {"stretch", 100 * longest, maxStretch, "%"}};
     return outcome;
 }
 

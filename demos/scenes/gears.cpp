@@ -118,8 +118,8 @@ Train Train::ofFactory(const std::filesystem::path& folder) {
     for (const glm::vec3& point : mesh.points)
         if (double(glm::length(glm::vec2(point))) > tips * largest)
             sum += std::polar(1.0, factoryTeeth * std::atan2(double(point.y), double(point.x)));
-    const glm::quat turn = glm::angleAxis(-float(std::arg(sum) / factoryTeeth), glm::vec3(0, 0, 1));
-    for (glm::vec3& point : mesh.points) point = turn * point;
+    const glm::quat rotation = glm::angleAxis(-float(std::arg(sum) / factoryTeeth), glm::vec3(0, 0, 1));
+    for (glm::vec3& point : mesh.points) point = rotation * point;
     const shapes::Gear part{.teeth = factoryTeeth, .toothModule = factoryModule};
     return {{part, part}, {mesh, mesh}, factoryApart};
 }

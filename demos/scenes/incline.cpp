@@ -15,7 +15,7 @@ constexpr glm::vec3 halfBlock{0.12f, 0.12f, 0.06f};       // low: it would not t
 constexpr float lane = 0.36f;                             // between blocks [m]
 constexpr float halfThickness = 0.1f;                     // of the inclines [m]
 constexpr float settled = 0.25f;                          // start of the measurement of acceleration [s]
-constexpr double maxCreep = 0.1;                          // drift of blocks that stick, over the whole time [voxels]
+constexpr double maxDrift = 0.1;                          // drift of blocks that stick, over the whole time [voxels]
 constexpr float maxSliding = 0.98f, minSticking = 1.02f;  // friction divided by the tangent
 
 constexpr Look rampLook{.colour = 0x35506b, .roughness = 0.6f};
@@ -41,8 +41,8 @@ void addIncline(Stage& stage, std::vector<Rider>& riders, const InclineOptions& 
                 const std::shared_ptr<const Thing>& block) {
     const float slope = glm::radians(degrees);
     // as long as the fastest block needs, plus a margin
-    const float way = 0.5f * gravity * std::sin(slope) * options.seconds * options.seconds;
-    const float halfLength = 0.5f * way + 4 * halfBlock.x, width = lane * float(options.frictions.size());
+    const float distance = 0.5f * gravity * std::sin(slope) * options.seconds * options.seconds;
+    const float halfLength = 0.5f * distance + 4 * halfBlock.x, width = lane * float(options.frictions.size());
     const glm::quat tilt = glm::angleAxis(slope, glm::vec3(0, 1, 0));
     const auto ramp = makeThing(shapes::box({halfLength, width / 2, halfThickness}), {options.voxelSize});
     const Pose pose{{0, y + width / 2, halfLength * std::sin(slope)}, tilt};
@@ -61,20 +61,20 @@ void addIncline(Stage& stage, std::vector<Rider>& riders, const InclineOptions& 
 }
 
 std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, float voxelSize) {
-    double creep = 0, worst = 0;
+    double drift = 0, worst = 0;
     int sticking = 0, sliding = 0, stuck = 0;
     for (const Rider& rider : riders) {
-        const double way = glm::distance(positionOf(rider.body), rider.start);
+        const double distance = glm::distance(positionOf(rider.body), rider.start);
         if (rider.friction > minSticking) {
             ++sticking;
-            creep = worse(creep, way / voxelSize);
+            drift = worse(drift, distance / voxelSize);
         }
         if (rider.friction < maxSliding) {
             ++sliding;
             const double expected = rider.acceleration();
             const double measured =
                 (rider.body.getLinearVelocity().length() - rider.speedWhenSettled) / (time - settled);
-            stuck += way < 0.5 * (0.5 * expected * time * time);
+            stuck += distance < 0.5 * (0.5 * expected * time * time);
             worst = worse(worst, std::abs(measured / expected - 1));
         }
     }
@@ -82,7 +82,7 @@ std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, floa
     if (sliding > 0)
         criteria = {{"blocks that should slide and stick", double(stuck), 0},
                     {"acceleration off theory", 100 * worst, 2, "%"}};
-    if (sticking > 0) criteria.push_back({"creep of blocks that should stick", creep, maxCreep, "voxels"});
+    if (sticking > 0) criteria.push_back({"drift of blocks that should stick", drift, maxDrift, "voxels"});
     if (criteria.empty()) criteria.push_back({"frictions of which theory says nothing, and no other", 1, 0});
     return criteria;
 }

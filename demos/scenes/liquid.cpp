@@ -32,7 +32,7 @@ constexpr float maxCells = 2;       // max movement of the liquid per step
 constexpr float glass = 0.012f;     // thickness of the tank's walls [m]
 constexpr float glassGap = 0.002f;  // between the liquid and the displayed walls [m]
 constexpr float pictured = 0.4f;    // time of the still picture [s]
-constexpr double turn = 6.283185307;
+constexpr double fullTurn = 6.283185307;
 
 constexpr double maxError = 3, maxFinalError = 1;  // of the volume [%]
 constexpr double maxDepth = 0.25;                  // of the liquid's surface inside the knot, anywhere [voxels]
@@ -90,10 +90,12 @@ struct Knot {
     glm::vec3 centre;
     float turns;  // revolutions per second
 
-    Pose poseAt(double time) const { return {centre, glm::angleAxis(float(turn * turns * time), glm::vec3(0, 0, 1))}; }
+    Pose poseAt(double time) const {
+        return {centre, glm::angleAxis(float(fullTurn * turns * time), glm::vec3(0, 0, 1))};
+    }
     fluid::Solid at(double time, const Tank& tank) const {
         return fluid::solid(mesh, poseAt(time), *tank.transform,
-                            {.velocity = {{}, {0, 0, float(turn * turns)}}, .halfWidthVoxels = skin});
+                            {.velocity = {{}, {0, 0, float(fullTurn * turns)}}, .halfWidthVoxels = skin});
     }
     // Returns the distance to the knot, negative inside; far away it is a bound [m].
     double from(const glm::vec3& point, const Pose& pose) const {
@@ -108,7 +110,7 @@ struct Faults {
     double within = 0;  // of the liquid in the knot [parts of the volume]
     double beyond = 0;  // of the surface beyond the tank's walls [m]
 
-    void look(const FloatGrid& shape, const Mesh& surface, const Knot& knot, const Pose& pose, const Tank& tank) {
+    void observe(const FloatGrid& shape, const Mesh& surface, const Knot& knot, const Pose& pose, const Tank& tank) {
         for (const glm::vec3& p : surface.points) {
             depth = worse(depth, -knot.from(p, pose));
             const glm::vec3 out = glm::max(tank.lower() - p, p - tank.upper());
@@ -169,7 +171,7 @@ class Scene {
     void keepFrame() {
         const Mesh surface = surfaceOf(water_->shape());
         const Pose pose = knot_.poseAt(time_);
-        faults_.look(water_->shape(), surface, knot_, pose, tank_);
+        faults_.observe(water_->shape(), surface, knot_, pose, tank_);
         outcome_.table.rows.push_back(
             {time_, water_->volume(), water_->restored(), double(cells_), double(outcome_.stepMs.size())});
         outcome_.fingerprint = outcome_.fingerprint * 31 + hash(surface);

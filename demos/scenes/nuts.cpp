@@ -108,9 +108,9 @@ void hold(btRigidBody& body) {
 }
 
 // Stops a nut that has made `most` revolutions.
-void follow(Rider& rider, const Pose& pose, double time, double most) {
+void follow(Rider& rider, const Pose& pose, double time, double maxTurns) {
     const bool hasSettled = !rider.heights.empty();
-    if (hasSettled && rider.turns >= most) return;
+    if (hasSettled && rider.turns >= maxTurns) return;
     rider.turning.follow(pose.rotation);
     const double turns = rider.start - rider.turning.turns(), height = pose.position.z;
     const auto whole = double(rider.heights.size());
@@ -120,7 +120,7 @@ void follow(Rider& rider, const Pose& pose, double time, double most) {
     rider.speeds.emplace_back(time, spinOf(rider.body));
     rider.turns = turns;
     rider.height = height;
-    if (hasSettled && turns >= most) hold(rider.body);
+    if (hasSettled && turns >= maxTurns) hold(rider.body);
 }
 
 // Returns the max error of all revolutions [%].
@@ -176,12 +176,12 @@ Verdict judge(const std::vector<Rider>& riders, const Theory& theory, double tur
 std::vector<Criterion> criteriaOf(const Verdict& verdict, double deepest, double voxelSize) {
     std::vector<Criterion> criteria;
     if (verdict.running > 0)
-        criteria = {{"advance of a turn off the pitch", verdict.advance, 1, "%"},
+        criteria = {{"error of the advance per turn, of the pitch", verdict.advance, 1, "%"},
                     {"nuts that should run and stuck", double(verdict.stuck), 0},
                     {"unevenness of angular speed", verdict.unevenness, 10, "%"}};
     if (verdict.staying > 0) {
-        criteria.push_back({"turn of nuts that should stay", verdict.turned, maxPlay, "degrees"});
-        criteria.push_back({"way of nuts that should stay", verdict.slipped / voxelSize, 0.5, "voxels"});
+        criteria.push_back({"rotation of nuts that should stay", verdict.turned, maxPlay, "degrees"});
+        criteria.push_back({"displacement of nuts that should stay", verdict.slipped / voxelSize, 0.5, "voxels"});
     }
     if (criteria.empty()) criteria.push_back({"frictions of which theory says nothing, and no other", 1, 0});
     criteria.push_back({"deepest penetration", deepest / voxelSize, 0.5, "voxels"});

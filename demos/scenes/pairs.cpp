@@ -97,8 +97,8 @@ struct CompoundShape {
     btCompoundShape shape;
 };
 
-Mesh moved(Mesh mesh, const glm::vec3& by, const glm::quat& turn = {1, 0, 0, 0}) {
-    for (glm::vec3& point : mesh.points) point = turn * point + by;
+Mesh moved(Mesh mesh, const glm::vec3& by, const glm::quat& rotation = {1, 0, 0, 0}) {
+    for (glm::vec3& point : mesh.points) point = rotation * point + by;
     return mesh;
 }
 

@@ -46,9 +46,9 @@ struct Lane {
 
 // Returns a pose with the lower end above the opening, offset from the hole's axis, and tilted about that end.
 Pose startOf(const shapes::Peg& part, float mouth, float offset, float tilt) {
-    const glm::quat turn = glm::angleAxis(glm::radians(tilt), glm::normalize(glm::vec3(1, 2, 0)));
+    const glm::quat rotation = glm::angleAxis(glm::radians(tilt), glm::normalize(glm::vec3(1, 2, 0)));
     const glm::vec3 end(part.clearance / 2 + offset, 0, mouth + above);
-    return {end + turn * glm::vec3(0, 0, part.length / 2), turn};
+    return {end + rotation * glm::vec3(0, 0, part.length / 2), rotation};
 }
 
 // Returns the height of the lowest point of its lower end: pegs lean within their play.

@@ -71,7 +71,7 @@ void watch(Shot& shot) {
 }
 
 // Returns the count of failures for each thickness and speed that has any.
-std::string tell(const std::vector<Shot>& shots, bool Shot::*failed) {
+std::string describe(const std::vector<Shot>& shots, bool Shot::*failed) {
     std::string text;
     std::map<std::pair<float, float>, std::pair<int, int>> counts;
     for (const Shot& shot : shots) {
@@ -120,8 +120,8 @@ Outcome plates(const PlatesOptions& options) {
                                     .elevation = 0.75f,
                                     .groundHeight = -1});
     outcome.facts = {{"balls", std::to_string(shots.size())},
-                     {"passed", tell(shots, &Shot::passed)},
-                     {"faster than before", tell(shots, &Shot::gained)}};
+                     {"passed", describe(shots, &Shot::passed)},
+                     {"faster than before", describe(shots, &Shot::gained)}};
     outcome.criteria = {{"balls that passed their plate", count(&Shot::passed), 0},
                         {"balls with NaN", count(&Shot::lost), 0},
                         {"balls faster than before", count(&Shot::gained), 0}};

@@ -52,9 +52,10 @@ glm::dvec3 angularMomentum(const btRigidBody& body) {
 
 // Returns the max relative difference of the mass and moments of inertia of two solids.
 double difference(const MassProperties& a, const MassProperties& b) {
-    double most = std::abs(a.volume / b.volume - 1);
-    for (int i = 0; i < 3; ++i) most = worse(most, std::abs(double(a.principalInertia[i]) / b.principalInertia[i] - 1));
-    return most;
+    double largest = std::abs(a.volume / b.volume - 1);
+    for (int i = 0; i < 3; ++i)
+        largest = worse(largest, std::abs(double(a.principalInertia[i]) / b.principalInertia[i] - 1));
+    return largest;
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ Basin::Basin(const openvdb::math::Transform& cells, const Coord& size)
       solid_{openvdb::createLevelSet<FloatGrid>(cells.voxelSize()[0]), Vec3SGrid::create(Vec3f(0)), nullptr, nullptr} {}
 
 // Returns the body's velocity, but zero for faces in the box's walls, which never move.
-Vec3SGrid::Ptr Basin::besideWalls(const Vec3SGrid& bodyVelocity) const {
+Vec3SGrid::Ptr Basin::nextToWalls(const Vec3SGrid& bodyVelocity) const {
     const Vec3SGrid::Ptr result = bodyVelocity.deepCopy();
     for (auto face = result->beginValueOn(); face; ++face) {
         Vec3f speed = *face;
@@ -116,7 +116,7 @@ Vec3SGrid::Ptr Basin::besideWalls(const Vec3SGrid& bodyVelocity) const {
 
 void Basin::place(const fluid::Solid& solid) {
     solid_ = solid;
-    solid_.velocity = besideWalls(*solid.velocity);
+    solid_.velocity = nextToWalls(*solid.velocity);
     open_ = empty_->deepCopy();
     auto open = open_->getAccessor();
     for (auto faces = solid.openFaces->cbeginValueOn(); faces; ++faces) {

@@ -35,7 +35,7 @@ class Basin {
     openvdb::FloatGrid::Ptr inside(const openvdb::FloatGrid& liquid) const;
 
   private:
-    openvdb::Vec3SGrid::Ptr besideWalls(const openvdb::Vec3SGrid& bodyVelocity) const;
+    openvdb::Vec3SGrid::Ptr nextToWalls(const openvdb::Vec3SGrid& bodyVelocity) const;
     void continueInBody(openvdb::FloatGrid& liquid, const openvdb::FloatGrid& before) const;
     void slideAlongBody(FaceVelocity& velocity) const;
 

@@ -230,14 +230,14 @@ struct Specimen::Descent {
     }
 };
 
-double Specimen::deepestIn(const ExactDistance& other, const Pose& self, const Pose& otherPose, double least) const {
-    Descent descent{*this, other, Motion(self), Motion(otherPose), least};
+double Specimen::deepestIn(const ExactDistance& other, const Pose& self, const Pose& otherPose, double minimum) const {
+    Descent descent{*this, other, Motion(self), Motion(otherPose), minimum};
     descent.descend(balls_.front());
     return descent.deepest;
 }
 
-double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB, double least) {
-    return a.deepestIn(b.distance(), poseA, poseB, b.deepestIn(a.distance(), poseB, poseA, least));
+double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB, double minimum) {
+    return a.deepestIn(b.distance(), poseA, poseB, b.deepestIn(a.distance(), poseB, poseA, minimum));
 }
 
 }  // namespace bilayer::demo

@@ -61,7 +61,7 @@ class Specimen {
 
     /// Returns the max depth of this body's surface points below the surface of another body, or `least` if that is
     /// greater [m].
-    double deepestIn(const ExactDistance& other, const Pose& self, const Pose& otherPose, double least = 0) const;
+    double deepestIn(const ExactDistance& other, const Pose& self, const Pose& otherPose, double minimum = 0) const;
 
   private:
     struct Ball {
@@ -81,6 +81,6 @@ class Specimen {
 
 /// Returns the penetration depth: the max depth of the surface points of either body below the surface of the other, or
 /// `least` if that is greater [m].
-double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB, double least = 0);
+double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB, double minimum = 0);
 
 }  // namespace bilayer::demo

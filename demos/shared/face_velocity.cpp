@@ -94,10 +94,10 @@ Vec3SGrid::Ptr FaceVelocity::atCentres() const {
 }
 
 float FaceVelocity::fastest() const {
-    float most = 0;
+    float largest = 0;
     for (const auto& axis : axes)
-        for (auto face = axis->cbeginValueOn(); face; ++face) most = std::max(most, std::abs(*face));
-    return most;
+        for (auto face = axis->cbeginValueOn(); face; ++face) largest = std::max(largest, std::abs(*face));
+    return largest;
 }
 
 void extrapolate(FaceVelocity& velocity, int layers) {

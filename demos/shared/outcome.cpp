@@ -57,15 +57,15 @@ void printBodies(const Outcome& outcome) {
 }  // namespace
 
 double Energies::rise() const {
-    double least = std::numeric_limits<double>::infinity(), most = 0, peak = 0;
+    double smallest = std::numeric_limits<double>::infinity(), largest = 0, peak = 0;
     for (std::size_t i = 0; i < kinetic.size(); ++i) {
         const double energy = kinetic[i] + potential[i];
         if (std::isnan(energy)) return energy;
-        least = std::min(least, energy);
-        most = std::max(most, energy - least);
+        smallest = std::min(smallest, energy);
+        largest = std::max(largest, energy - smallest);
         peak = std::max(peak, kinetic[i]);
     }
-    return peak > 0 ? most / peak : 0;
+    return peak > 0 ? largest / peak : 0;
 }
 
 double percentile(std::vector<double> values, double share) {

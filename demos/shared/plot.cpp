@@ -36,16 +36,16 @@ struct Axis {
 
 // Returns an axis that starts at or below 0, with steps of 1, 2 or 5 times a power of ten.
 Axis linearAxisOf(const std::vector<double>& values, double from, double to) {
-    const auto [least, most] = std::minmax_element(values.begin(), values.end());
-    const double low = std::min(0.0, *least), high = *most > low ? *most : low + 1;
+    const auto [smallest, largest] = std::minmax_element(values.begin(), values.end());
+    const double low = std::min(0.0, *smallest), high = *largest > low ? *largest : low + 1;
     const double rough = (high - low) / steps, decade = std::pow(10, std::floor(std::log10(rough)));
     const double step = decade * (rough > 5 * decade ? 10 : rough > 2 * decade ? 5 : rough > decade ? 2 : 1);
     return {step * std::floor(low / step + 1e-9), step * std::ceil(high / step - 1e-9), from, to, step};
 }
 
 Axis axisOf(const std::vector<double>& values, bool wholeDecades, double from, double to) {
-    const auto [least, most] = std::minmax_element(values.begin(), values.end());
-    double low = std::log10(*least), high = std::log10(*most);
+    const auto [smallest, largest] = std::minmax_element(values.begin(), values.end());
+    double low = std::log10(*smallest), high = std::log10(*largest);
     if (wholeDecades) {
         low = std::floor(low + decadeSlack);
         high = std::ceil(high - decadeSlack);

@@ -80,13 +80,13 @@ Int32Tree::Ptr cellsOf(const FloatGrid& liquid, const Basin& basin) {
         const auto open = basin.open().getConstAccessor();
         for (auto cell = leaf.beginValueOn(); cell; ++cell) {
             const Coord at = cell.getCoord();
-            float most = openvdb::math::Max(open.getValue(at)[0], open.getValue(at)[1], open.getValue(at)[2]);
+            float largest = openvdb::math::Max(open.getValue(at)[0], open.getValue(at)[1], open.getValue(at)[2]);
             for (int axis = 0; axis < 3; ++axis) {
                 Coord next = at;
                 next[axis] += 1;
-                most = std::max(most, open.getValue(next)[axis]);
+                largest = std::max(largest, open.getValue(next)[axis]);
             }
-            if (!(most > 0)) cell.setValueOff();
+            if (!(largest > 0)) cell.setValueOff();
         }
     });
     return poisson::createIndexTree(mask->tree());

@@ -39,16 +39,16 @@ std::shared_ptr<btConcaveShape> triangleMesh(const Mesh& mesh) {
 
 double squaredDistance(const glm::dvec3& place, const std::array<glm::dvec3, 3>& triangle) {
     const glm::dvec3 normal = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
-    double least = std::numeric_limits<double>::max();
+    double smallest = std::numeric_limits<double>::max();
     bool isOver = true;
     for (int i = 0; i < 3; ++i) {
-        const glm::dvec3 way = triangle[(i + 1) % 3] - triangle[i], from = place - triangle[i];
-        isOver = isOver && glm::dot(glm::cross(way, from), normal) >= 0;
-        const double part = std::clamp(glm::dot(from, way) / glm::dot(way, way), 0.0, 1.0);
-        least = std::min(least, glm::dot(from - part * way, from - part * way));
+        const glm::dvec3 edge = triangle[(i + 1) % 3] - triangle[i], from = place - triangle[i];
+        isOver = isOver && glm::dot(glm::cross(edge, from), normal) >= 0;
+        const double part = std::clamp(glm::dot(from, edge) / glm::dot(edge, edge), 0.0, 1.0);
+        smallest = std::min(smallest, glm::dot(from - part * edge, from - part * edge));
     }
     const double height = glm::dot(place - triangle[0], normal);
-    return isOver ? height * height / glm::dot(normal, normal) : least;
+    return isOver ? height * height / glm::dot(normal, normal) : smallest;
 }
 
 /// Returns the angle between a direction and the cone spanned by others. It starts at the nearest of these and moves
@@ -58,7 +58,7 @@ double angleToCone(const glm::dvec3& direction, const std::vector<glm::dvec3>& n
         return glm::dot(a, direction) < glm::dot(b, direction);
     };
     glm::dvec3 nearest = *std::max_element(normals.begin(), normals.end(), isFarther);
-    for (int turn = 0; turn < 20; ++turn)
+    for (int round = 0; round < 20; ++round)
         for (const glm::dvec3& normal : normals) {
             const double a = glm::dot(direction, nearest), b = glm::dot(direction, normal),
                          c = glm::dot(nearest, normal);

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "collider/field/interpolant.h"
+
 namespace bilayer::bullet {
 
 namespace {
@@ -24,8 +26,6 @@ constexpr float minResolution = 64, maxResolution = 512;
 constexpr float rounding = 1e-3f;  // [voxels] and steps: numbers within this of an integer count as integers
 constexpr float minVoxel = 2e-5f;  // [m] the minimum of OpenVDB
 constexpr float maxIndex = 1e9f;   // maximum coordinate of a field [voxels]
-// A point is in the band if the eight voxels around it are.
-constexpr float cellDiagonal = 1.7320508f;  // [voxels]
 // Interior band width [voxels]: the minimum for shallow penetration, and the width beyond which CCD or shorter steps
 // are cheaper than more voxels.
 constexpr int minInterior = 3, maxInterior = 10;
@@ -164,9 +164,9 @@ Settings recommendSettings(const MeshReport& mesh, const SceneRequirements& scen
     advice.substeps = std::max(1, wholeFrom(spin * scene.step / straightTurn));
     const float deepest = wallPart * (wall > 0 ? wall : longestSide);
     advice.substepsWithoutSpeculation = std::max(advice.substeps, wholeFrom(stepLength / deepest));
-    advice.exteriorWidthVoxels = std::max(1, wholeFrom(advice.margin / h + cellDiagonal));
-    advice.interiorWidthVoxels =
-        std::clamp(wholeFrom(stepLength / (float(advice.substeps) * h) + cellDiagonal), minInterior, maxInterior);
+    advice.exteriorWidthVoxels = std::max(1, wholeFrom(advice.margin / h + bilayer::detail::cellDiagonal));
+    advice.interiorWidthVoxels = std::clamp(
+        wholeFrom(stepLength / (float(advice.substeps) * h) + bilayer::detail::cellDiagonal), minInterior, maxInterior);
     estimate(mesh, advice);
 
     warnOfMesh(mesh, advice.warnings);

@@ -12,14 +12,13 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "sdf/base/unit_tolerance.h"
 
 namespace bilayer::python {
 namespace {
 
 constexpr std::array<std::pair<const char*, Storage>, 2> storages{
     {{"float32", Storage::float32}, {"fixed16", Storage::fixed16}}};
-/// Tolerance of a unit quaternion's squared length: float32 quaternions that were multiplied are off by less.
-constexpr float unitTolerance = 1e-3f;
 
 // A hit as numpy sees it.
 struct Hit {
@@ -160,7 +159,7 @@ py::object overlapsBox(const Field& field, const py::object& centres, const py::
     std::vector<OrientedBox> boxes(centre.points().size());
     for (std::size_t i = 0; i < boxes.size(); ++i) {
         const glm::vec4& q = quaternions[i];
-        if (std::abs(glm::dot(q, q) - 1) > unitTolerance)
+        if (std::abs(glm::dot(q, q) - 1) > detail::unitTolerance)
             throw std::invalid_argument(fmt::format("rotations: quaternion {} is not of length 1", i));
         boxes[i] = {centre.points()[i], half.points()[i], glm::quat(q.x, q.y, q.z, q.w)};  // w, x, y, z
     }

@@ -11,12 +11,10 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "sdf/base/unit_tolerance.h"
 
 namespace bilayer::python {
 namespace {
-
-/// Tolerance of a unit quaternion's squared length; the pose is normalized.
-constexpr float unitTolerance = 1e-3f;
 
 Pose makePose(const py::object& position, const py::object& rotation) {
     const glm::vec3 place = vector(position, "position");
@@ -25,7 +23,7 @@ Pose makePose(const py::object& position, const py::object& rotation) {
         throw std::invalid_argument("rotation: expected one quaternion w, x, y, z, got " + text(numbers.shape()));
     const auto q = numbers.as<float>();
     const glm::quat quaternion(q[0], q[1], q[2], q[3]);
-    if (std::abs(glm::dot(quaternion, quaternion) - 1) > unitTolerance)
+    if (std::abs(glm::dot(quaternion, quaternion) - 1) > detail::unitTolerance)
         throw std::invalid_argument(fmt::format(
             "rotation: expected a quaternion w, x, y, z of length 1, got one of length {:g}", glm::length(quaternion)));
     const bool unit = glm::dot(quaternion, quaternion) == 1;  // to the bit through pickles

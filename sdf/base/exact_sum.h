@@ -1,5 +1,5 @@
 // Floating-point sums without rounding error; internal.
-// Tested by tests/sdf/inspect.cpp.
+// Tested by tests/sdf/inspect.cpp through inspect().
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // Arrays on huge pages, for large data with random access.
-// Tested by tests/sdf/mesh.cpp.
+// Tested by tests/sdf/mesh.cpp through weld().
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // On which side of a line a point of the plane lies, without rounding error; internal.
-// Tested by tests/sdf/triangulate.cpp.
+// Tested by tests/sdf/triangulate.cpp through triangulate().
 #pragma once
 
 #include <cmath>

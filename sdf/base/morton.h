@@ -1,5 +1,5 @@
 // Morton order: points that are close in space are mostly close in this order.
-// Tested by tests/sdf/flood.cpp.
+// Tested by tests/sdf/flood.cpp through build().
 #pragma once
 
 #include <array>
@@ -12,11 +12,11 @@ namespace bilayer::detail {
 /// decides; on a tie, the first such axis decides. No Morton keys are built.
 inline bool beforeInMortonOrder(const std::array<std::uint32_t, 3>& a, const std::array<std::uint32_t, 3>& b) {
     std::size_t axis = 0;
-    std::uint32_t most = a[0] ^ b[0];
+    std::uint32_t largest = a[0] ^ b[0];
     for (std::size_t other = 1; other < 3; ++other) {
         const std::uint32_t differing = a[other] ^ b[other];
-        if (most < differing && most < (most ^ differing)) {
-            most = differing;
+        if (largest < differing && largest < (largest ^ differing)) {
+            largest = differing;
             axis = other;
         }
     }

@@ -1,5 +1,5 @@
 // OpenVDB's points for the sources of this project, as sdf/base/openvdb.h gives its grids.
-// Tested by tests/sdf/vdb_io.cpp.
+// Tested by tests/collider/body.cpp.
 #pragma once
 
 #include <openvdb/points/PointDataGrid.h>

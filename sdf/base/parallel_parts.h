@@ -1,5 +1,5 @@
 // Parallel work on the parts of a file that reports the same error as a sequential reader; internal.
-// Tested by tests/sdf/mesh_readers.cpp.
+// Tested by tests/sdf/mesh_readers.cpp through readMesh().
 #pragma once
 
 #include <oneapi/tbb/parallel_for.h>

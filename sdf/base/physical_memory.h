@@ -1,5 +1,5 @@
 // The physical memory of the machine. Requests that cannot fit into it are rejected early.
-// Tested by tests/sdf/build.cpp.
+// Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <unistd.h>

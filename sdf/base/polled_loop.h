@@ -1,5 +1,5 @@
 // A parallel loop that can be cancelled.
-// Tested by tests/sdf/progress.cpp.
+// Tested by tests/sdf/progress.cpp through TriangleTree.
 #pragma once
 
 #include <oneapi/tbb/blocked_range.h>

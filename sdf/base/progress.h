@@ -47,18 +47,18 @@ class Progress {
         const std::unique_lock lock(mutex_, std::try_to_lock);
         if (!lock || now < next_.load(std::memory_order_relaxed)) return;
         // a second pass, over a repaired mesh, must not report less progress than the first
-        told_ = std::max(told_, total_ == 0 ? 0.f : workShare * float(done_) / float(total_));
-        tell(told_);
+        reported_ = std::max(reported_, total_ == 0 ? 0.f : workShare * float(done_) / float(total_));
+        report(reported_);
         next_ = std::chrono::steady_clock::now().time_since_epoch() + interval_;
     }
 
     /// Reports that everything is done.
     void finish() {
-        if (listener_) tell(1);
+        if (listener_) report(1);
     }
 
   private:
-    void tell(float part) {
+    void report(float part) {
         if (listener_(part)) return;
         cancelled_ = true;
         throw Cancelled();
@@ -69,11 +69,15 @@ class Progress {
     const std::function<bool(float)>& listener_;
     const std::chrono::steady_clock::duration interval_;
     std::atomic<std::size_t> total_{0}, done_{0};
-    float told_ = 0;
+    float reported_ = 0;
     std::atomic<bool> cancelled_{false};
     std::atomic<std::chrono::steady_clock::duration> next_{std::chrono::steady_clock::duration::min()};
     std::mutex mutex_;
 };
+
+/// Suits loops over triangles that are sorted into bricks or cut into pieces: about 0.1 ms. Huge triangles poll more
+/// often.
+inline constexpr std::size_t trianglesPerPoll = 1024;
 
 /// Polls unless `progress` is null. Throws Cancelled.
 inline void poll(Progress* progress) {

@@ -1,5 +1,5 @@
 // Measures the phases of a build.
-// Tested by tests/sdf/build.cpp.
+// Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <chrono>

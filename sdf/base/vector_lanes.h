@@ -1,6 +1,6 @@
 // Vectors of three components in SIMD lanes: one vector per lane. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/sdf/wide_tree.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #if defined(BILAYER_SDF_VECTOR_LANES_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_VECTOR_LANES_H
 #undef BILAYER_SDF_VECTOR_LANES_H

@@ -227,20 +227,20 @@ struct BlockQuery {
         if (!(centre.best2 < bound * bound)) return;
         answer.lastWinner = answer.visits[centre.winner().first].leaf;
         NodeList& list = answer.lists[level];
-        const float atMost = std::min(reach, std::sqrt(centre.best2) + radius);
-        narrowList(tree, from, {lower, lower + (side - 1)}, atMost + slack, 2 * side, list);
-        if (level == 2 && answerAtOnce(centre, list, lower, atMost, radius)) return;
+        const float upperBound = std::min(reach, std::sqrt(centre.best2) + radius);
+        narrowList(tree, from, {lower, lower + (side - 1)}, upperBound + slack, 2 * side, list);
+        if (level == 2 && answerAtOnce(centre, list, lower, upperBound, radius)) return;
         for (const auto& step : path) {
             const glm::vec3 part = lower + 0.5f * side * glm::vec3(step[0], step[1], step[2]);
             if (level < 2)
                 answerCube(list, part, level + 1);
             else
-                answerVoxel(list, part, atMost);
+                answerVoxel(list, part, upperBound);
         }
     }
 
-    void answerVoxel(const NodeList& list, const glm::vec3& position, float atMost) {
-        const VoxelQuery query = searchWithin(list, position, std::min(reach, atMost + slack));
+    void answerVoxel(const NodeList& list, const glm::vec3& position, float upperBound) {
+        const VoxelQuery query = searchWithin(list, position, std::min(reach, upperBound + slack));
         if (query.best2 > reach * reach * roundUp || answer.visits.empty()) return;
         const auto [visit, place] = query.winner();
         if (answer.visits[visit].distance2[place] != query.best2) return;
@@ -252,13 +252,14 @@ struct BlockQuery {
     // Answers the voxels of a cube of side 2 at once, if few triangles are relevant. Triangles are first measured from
     // the centre. Relevant are those whose distance does not exceed the upper bound for the nearest triangle of any
     // voxel.
-    bool answerAtOnce(VoxelQuery& centre, const NodeList& list, const glm::vec3& lower, float atMost, float radius) {
+    bool answerAtOnce(VoxelQuery& centre, const NodeList& list, const glm::vec3& lower, float upperBound,
+                      float radius) {
         if (list.count > maxNodes) return false;
         CubeQuery cube(tree, lower);
         const auto [visit, place] = centre.winner();
         const std::uint32_t winner = answer.visits[visit].leaf;
         cube.add(winner, place);
-        centre.widen(std::min(atMost, cube.farthest()) + radius + slack);
+        centre.widen(std::min(upperBound, cube.farthest()) + radius + slack);
         centre.search(BoxArrays(list), 0, list.count, list.nodes.data(), 0);
         for (const auto& v : answer.visits)
             for (std::size_t i = 0; i < treeWidth; ++i) {
@@ -288,12 +289,12 @@ struct BlockQuery {
         if (!sign) return;
         if (distance > farFrom) answer.far[x] |= bit;
         if (distance > midFrom) answer.mid[x] |= bit;
-        const float least = minFaceHeight * std::max(1.f, reach / usualReach);
+        const float smallest = minFaceHeight * std::max(1.f, reach / usualReach);
         // on the surface either side is correct, and no link propagates it
-        if (heights.lowest > least || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
-        if (heights.highest < -least) answer.sides.inside[x] |= bit;
-        if (heights.nearest > least) answer.nearest.outside[x] |= bit;
-        if (heights.nearest < -least) answer.nearest.inside[x] |= bit;
+        if (heights.lowest > smallest || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
+        if (heights.highest < -smallest) answer.sides.inside[x] |= bit;
+        if (heights.nearest > smallest) answer.nearest.outside[x] |= bit;
+        if (heights.nearest < -smallest) answer.nearest.inside[x] |= bit;
     }
 };
 

@@ -1,7 +1,7 @@
 // A bounding volume hierarchy with eight children per node. It is implicit: nodes have no pointers, and traversal has
 // no expensive branches. Leaves are stored in Hilbert order. The user of the tree defines what a leaf holds, in most
 // cases eight triangles.
-// Tested by tests/sdf/triangle_tree.cpp.
+// Tested by tests/sdf/triangle_tree.cpp through TriangleTree.
 #pragma once
 
 #include <cstddef>

@@ -34,8 +34,8 @@ struct BoxLanes {
     PointLanes lower, upper;
 
     explicit BoxLanes(const PointLanes* c)
-        : lower{least(c[0].x, c[1].x, c[2].x), least(c[0].y, c[1].y, c[2].y), least(c[0].z, c[1].z, c[2].z)},
-          upper{most(c[0].x, c[1].x, c[2].x), most(c[0].y, c[1].y, c[2].y), most(c[0].z, c[1].z, c[2].z)} {}
+        : lower{smallest(c[0].x, c[1].x, c[2].x), smallest(c[0].y, c[1].y, c[2].y), smallest(c[0].z, c[1].z, c[2].z)},
+          upper{largest(c[0].x, c[1].x, c[2].x), largest(c[0].y, c[1].y, c[2].y), largest(c[0].z, c[1].z, c[2].z)} {}
     BoxLanes(const PointLanes& lower, const PointLanes& upper) : lower(lower), upper(upper) {}
 
     Mask meet(const BoxLanes& o) const {
@@ -45,8 +45,8 @@ struct BoxLanes {
         return hn::And(x, hn::And(y, z));
     }
 
-    static Vec least(Vec a, Vec b, Vec c) { return hn::Min(a, hn::Min(b, c)); }
-    static Vec most(Vec a, Vec b, Vec c) { return hn::Max(a, hn::Max(b, c)); }
+    static Vec smallest(Vec a, Vec b, Vec c) { return hn::Min(a, hn::Min(b, c)); }
+    static Vec largest(Vec a, Vec b, Vec c) { return hn::Max(a, hn::Max(b, c)); }
 };
 
 // The planes of triangles, and tests for the side on which points certainly lie.

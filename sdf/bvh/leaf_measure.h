@@ -1,7 +1,7 @@
 // SIMD distances of points to the boxes and leaves of a WideTree. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h. No sum crosses lanes, so all
 // instruction sets give the same bytes.
-// Tested by tests/sdf/wide_tree.cpp.
+// Tested by tests/sdf/pseudonormal.cpp through build().
 #if defined(BILAYER_SDF_LEAF_MEASURE_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_LEAF_MEASURE_H
 #undef BILAYER_SDF_LEAF_MEASURE_H
@@ -60,15 +60,15 @@ inline Measured measureFromCorner(const WideLeaf& leaf, Load load, Vec qx, Vec q
     const Vec ab = load(leaf.lengthAB), fromB = hn::Sub(x, ab);
     const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
     const Vec acx = load(leaf.directionAC[0]), acy = load(leaf.directionAC[1]);
-    const Vec besideBC = det(bcx, bcy, fromB, y), besideAC = det(x, y, acx, acy);
+    const Vec acrossBC = det(bcx, bcy, fromB, y), acrossAC = det(x, y, acx, acy);
     const Vec alongBC = hn::Add(hn::Mul(fromB, bcx), hn::Mul(y, bcy));
     const Vec alongAC = hn::Add(hn::Mul(x, acx), hn::Mul(y, acy));
-    const Mask over = hn::Gt(hn::Min(y, hn::Min(besideBC, besideAC)), hn::Zero(tag));
-    const auto edge = [&](Vec beside, Vec along, Vec length) {
-        return hn::Add(beyond2(along, length), hn::IfThenZeroElse(over, square(beside)));
+    const Mask over = hn::Gt(hn::Min(y, hn::Min(acrossBC, acrossAC)), hn::Zero(tag));
+    const auto edge = [&](Vec across, Vec along, Vec length) {
+        return hn::Add(beyond2(along, length), hn::IfThenZeroElse(over, square(across)));
     };
-    const Vec flat2 = hn::Min(edge(y, x, ab), hn::Min(edge(besideBC, alongBC, load(leaf.lengthBC)),
-                                                      edge(besideAC, alongAC, load(leaf.lengthAC))));
+    const Vec flat2 = hn::Min(edge(y, x, ab), hn::Min(edge(acrossBC, alongBC, load(leaf.lengthBC)),
+                                                      edge(acrossAC, alongAC, load(leaf.lengthAC))));
     return {hn::Add(flat2, square(z)), hn::IfThenElseZero(over, z)};
 }
 

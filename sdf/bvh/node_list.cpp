@@ -42,8 +42,8 @@ NodeList wholeTree(const WideTree& tree) {
     return list;
 }
 
-void narrow(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
-            NodeList& to) {
+void collectNodes(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
+                  NodeList& to) {
     HWY_DYNAMIC_DISPATCH(narrowNodes)(tree, from, voxels, reach, largest, to);
 }
 

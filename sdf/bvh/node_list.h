@@ -31,7 +31,7 @@ struct VoxelBox {
 
 /// Writes to `to` the nodes that come within `reach` of the voxels. Groups with a side longer than `largest` are
 /// replaced by their children [voxels]. Overwrites `to`.
-void narrow(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
-            NodeList& to);
+void collectNodes(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
+                  NodeList& to);
 
 }  // namespace bilayer::detail

@@ -1,6 +1,6 @@
 // SIMD narrowing of a list of nodes to those near a box of voxels. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/sdf/wide_tree.cpp.
+// Tested by tests/sdf/wide_tree.cpp through WideTree.
 #if defined(BILAYER_SDF_NODE_NARROWING_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_NODE_NARROWING_H
 #undef BILAYER_SDF_NODE_NARROWING_H
@@ -91,7 +91,7 @@ struct Narrowing {
     }
 };
 
-// Does the work of narrow().
+// Does the work of collectNodes().
 inline void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
                        NodeList& to) {
     const Tag tag;

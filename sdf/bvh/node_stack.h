@@ -1,6 +1,6 @@
 // The traversal of a tree from a node down, nearest nodes first. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/collider/mesh_rays.cpp.
+// Tested by tests/collider/mesh_rays.cpp through MeshTree.
 #if defined(BILAYER_SDF_NODE_STACK_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_NODE_STACK_H
 #undef BILAYER_SDF_NODE_STACK_H

@@ -1,5 +1,5 @@
 // Symmetric tensors of order two and three in 3D: the moments of the triangles of a cluster.
-// Tested by tests/sdf/winding.cpp.
+// Tested by tests/sdf/winding.cpp through WindingNumber.
 #pragma once
 
 #include <array>

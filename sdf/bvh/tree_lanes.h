@@ -1,6 +1,6 @@
 // SIMD lanes over a group or a leaf of a tree: one box or triangle per lane. Highway includes this file once for each
 // instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/sdf/wide_tree.cpp.
+// Tested by tests/sdf/inspect.cpp through inspect().
 #if defined(BILAYER_SDF_TREE_LANES_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_TREE_LANES_H
 #undef BILAYER_SDF_TREE_LANES_H

@@ -65,13 +65,13 @@ struct LineFrame {
 
     // Returns twice the signed area of the projected edge and the origin. The reversed edge has exactly the negative
     // value.
-    double beside(const glm::dvec3& a, const glm::dvec3& b) const {
+    double twiceArea(const glm::dvec3& a, const glm::dvec3& b) const {
         return glm::dot(a, u) * glm::dot(b, v) - glm::dot(a, v) * glm::dot(b, u);
     }
 
     // Returns 0 for a miss, otherwise the sign of the crossing; `along` receives its position.
     int cross(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double& along) const {
-        const double bc = beside(b, c), ca = beside(c, a), ab = beside(a, b);
+        const double bc = twiceArea(b, c), ca = twiceArea(c, a), ab = twiceArea(a, b);
         const bool front = bc > 0 && ca > 0 && ab > 0, back = bc < 0 && ca < 0 && ab < 0;
         if (!front && !back) return 0;
         const double sum = bc + ca + ab;

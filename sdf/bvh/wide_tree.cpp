@@ -169,8 +169,8 @@ void split(const TriangleParts& parts, std::vector<std::uint64_t>& keys, Progres
 // Returns a unit vector perpendicular to `direction`.
 glm::dvec3 across(const glm::dvec3& direction) {
     const glm::dvec3 a = glm::abs(direction);
-    const glm::dvec3 least(a.x <= a.y && a.x <= a.z, a.y < a.x && a.y <= a.z, a.z < a.x && a.z < a.y);
-    return glm::normalize(glm::cross(direction, least));
+    const glm::dvec3 smallest(a.x <= a.y && a.x <= a.z, a.y < a.x && a.y <= a.z, a.z < a.x && a.z < a.y);
+    return glm::normalize(glm::cross(direction, smallest));
 }
 
 template <class Vector>

@@ -1,5 +1,5 @@
 // Finds the balls that reach each block of a brick, by a counting sort per brick.
-// Tested by tests/sdf/exact.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
 #include <algorithm>
@@ -67,8 +67,8 @@ class BlockBins {
             return away * away;
         };
         const int x0 = block(lower.x);
-        const std::size_t most = count + std::size_t((x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1));
-        if (pairs_.size() < most) pairs_.resize(2 * most);
+        const std::size_t largest = count + std::size_t((x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1));
+        if (pairs_.size() < largest) pairs_.resize(2 * largest);
         for (int x = x0; x <= x1; ++x) {
             const float dx = toCentre(x, ball.sample.x), left = reach * reach - away2(dx), hx = dx * ball.normal.x;
             for (int y = y0; y <= y1; ++y) {

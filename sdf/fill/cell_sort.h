@@ -1,5 +1,5 @@
 // A counting sort of the items in a brick by spatial cell.
-// Tested by tests/sdf/exact.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // Groups small pieces by voxel. The cost of a brick full of tiny triangles then depends on its surface area, not on the
 // triangle count.
-// Tested by tests/sdf/exact.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
 #include <cstdint>

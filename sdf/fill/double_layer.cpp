@@ -18,8 +18,6 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t trianglesPerPoll = 1024;  // about 0.1 ms
-
 // Working memory of a thread, reused for each brick.
 struct LayerBrickScratch {
     LayerSamples samples;

@@ -26,11 +26,8 @@ namespace {
 /// Maximum edge length of a piece [voxels]. Longer edges are halved, so that a piece stays near the blocks that query
 /// it and floats resolve its frame.
 constexpr double longestPieceEdge = 16;
-/// Tolerance of the search for all triangles that can be nearest [voxels].
-constexpr float sideSlack = 1e-3f;
 /// Maximum count of paths that are tried before the winding number of the whole mesh.
 constexpr int maxPaths = 16;
-constexpr std::size_t trianglesPerPoll = 1024;  // about 0.1 ms
 
 // Working memory of a thread, reused for each brick.
 struct ExactBrickScratch {

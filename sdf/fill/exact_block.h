@@ -4,7 +4,7 @@
 // the sample of its nearest piece is within u + radius. Pieces beyond that are skipped, all others are evaluated. The
 // first bound u is the distance to the nearest sample; it decreases to the exact distance as pieces are evaluated.
 // Small pieces form clusters with their own sample and radius, so that most pieces are skipped together.
-// Tested by tests/sdf/exact.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
 #include <cstdint>

@@ -2,7 +2,7 @@
 //
 // The block is processed in cubes of 4x4x4 voxels. The layer points that reach a cube are selected from the surrounding
 // cells. While these points are applied, the voxels' nearest points stay in registers.
-// Tested by tests/sdf/double_layer.cpp.
+// Tested by tests/sdf/double_layer.cpp through build().
 #pragma once
 
 #include <array>

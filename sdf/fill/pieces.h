@@ -2,7 +2,7 @@
 // samples select the pieces that can be nearest to a voxel, and the pieces give the distance. This is the sampling of
 // the double layer method with both layers on the surface (delta = 0). The covering radius makes the selection provably
 // sufficient: the sample of the nearest piece lies within its radius plus any upper bound of the distance.
-// Tested by tests/sdf/exact.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
 #include <algorithm>

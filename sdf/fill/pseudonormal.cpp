@@ -20,8 +20,6 @@ namespace {
 /// Side of the cube of blocks that one task fills: large enough to amortize a task, small enough for many tasks
 /// [voxels].
 constexpr int taskSide = 32;
-/// Tolerance of the search for all triangles that can be nearest [voxels].
-constexpr float sideSlack = 1e-3f;
 /// Maximum node side that opens every node: only leaves remain in the list.
 constexpr float openAll = -1;
 
@@ -55,9 +53,9 @@ class PseudonormalFiller {
         std::vector<std::int32_t> triangles;
     };
 
-    void narrowTo(const NodeList& from, const glm::ivec3& origin, int side, NodeList& to) const {
+    void collectNear(const NodeList& from, const glm::ivec3& origin, int side, NodeList& to) const {
         const glm::vec3 lower(origin);
-        narrow(tree_, from, {lower, lower + float(side - 1)}, job_.reach, float(side), to);
+        collectNodes(tree_, from, {lower, lower + float(side - 1)}, job_.reach, float(side), to);
     }
 
     static glm::ivec3 octant(int i, int side) { return side * glm::ivec3(i >> 2, i >> 1 & 1, i & 1); }
@@ -67,7 +65,7 @@ class PseudonormalFiller {
         tbb::parallel_for(0, 8, [&](int i) {
             const glm::ivec3 child = origin + octant(i, side / 2);
             NodeList narrowed;
-            narrowTo(list, child, side / 2, narrowed);
+            collectNear(list, child, side / 2, narrowed);
             if (narrowed.count > 0) descend(child, side / 2, narrowed);
         });
     }
@@ -80,11 +78,11 @@ class PseudonormalFiller {
         scratch.answer.lastWinner = 0;
         for (int i = 0; i < 8; ++i) {
             const glm::ivec3 half = origin + octant(i, taskSide / 2);
-            narrowTo(list, half, taskSide / 2, scratch.half);
+            collectNear(list, half, taskSide / 2, scratch.half);
             if (scratch.half.count == 0) continue;
             for (int j = 0; j < 8; ++j) {
                 const glm::ivec3 block = half + octant(j, blockSide);
-                narrowTo(scratch.half, block, blockSide, scratch.block);
+                collectNear(scratch.half, block, blockSide, scratch.block);
                 if (scratch.block.count > 0) fillBlock(block, scratch);
             }
         }
@@ -135,7 +133,7 @@ class PseudonormalFiller {
         const glm::ivec3 at = block + glm::ivec3(voxel / 64, voxel / 8 % 8, voxel % 8);
         const glm::dvec3 point(at + tree_.base);
         const float distance = scratch.answer.distances[voxel] + sideSlack;
-        narrow(tree_, scratch.block, {glm::vec3(at), glm::vec3(at)}, distance, openAll, scratch.near);
+        collectNodes(tree_, scratch.block, {glm::vec3(at), glm::vec3(at)}, distance, openAll, scratch.near);
         scratch.side.begin(point);
         for (std::size_t i = 0; i < scratch.near.count; ++i)
             for (const std::uint32_t triangle : tree_.leaves[scratch.near.nodes[i]].triangles)

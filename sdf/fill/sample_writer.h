@@ -1,6 +1,6 @@
 // Appends samples of the double layer method, one per SIMD lane. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/sdf/double_layer.cpp.
+// Tested by tests/sdf/double_layer.cpp through build().
 #if defined(BILAYER_SDF_SAMPLE_WRITER_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_SAMPLE_WRITER_H
 #undef BILAYER_SDF_SAMPLE_WRITER_H

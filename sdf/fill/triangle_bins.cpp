@@ -16,12 +16,11 @@ namespace bilayer::detail {
 namespace {
 
 constexpr int smallestShift = 5;              // bricks of at least 32 voxels a side: their data fits a core's own cache
-constexpr double cellsAtMost = 1 << 22;       // maximum cell count, 16 MiB of counters; larger boxes get larger bricks
+constexpr double maxCells = 1 << 22;          // maximum cell count, 16 MiB of counters; larger boxes get larger bricks
 constexpr std::size_t maxCounters = 1 << 22;  // over all runs: 16 MiB
-constexpr std::size_t trianglesPerRun = 8192;   // work of one task
-constexpr std::size_t runsPerThread = 8;        // enough to balance unequal runs
-constexpr std::size_t trianglesPerPoll = 1024;  // tens of microseconds; huge triangles poll at each step
-constexpr std::size_t trianglesAhead = 16;      // prefetch distance of corners: about the memory latency
+constexpr std::size_t trianglesPerRun = 8192;  // work of one task
+constexpr std::size_t runsPerThread = 8;       // enough to balance unequal runs
+constexpr std::size_t trianglesAhead = 16;     // prefetch distance of corners: about the memory latency
 
 // Rounds down. Faster than std::floor without SSE 4.1. Valid for |value| < 2^31.
 int floorToInt(double value) {
@@ -41,7 +40,7 @@ struct BrickRange {
         for (shift = smallestShift;; ++shift) {
             first = floorToInt(lower) >> shift;
             size = (floorToInt(upper) >> shift) - first + 1;
-            if (double(size.x) * double(size.y) * double(size.z) <= cellsAtMost) return;
+            if (double(size.x) * double(size.y) * double(size.z) <= maxCells) return;
         }
     }
     std::size_t cells() const { return std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z); }
@@ -80,7 +79,7 @@ class FewBricks {
   private:
     std::uint32_t code_;
 };
-static_assert(cellsAtMost < double(1u << 29), "a code holds any cell");
+static_assert(maxCells < double(1u << 29), "a code holds any cell");
 
 class Binner {
   public:

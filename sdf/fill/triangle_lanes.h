@@ -1,6 +1,6 @@
 // A batch of triangles, one per SIMD lane. Highway includes this file once for each instruction set: only between
 // HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/sdf/double_layer.cpp.
+// Tested by tests/sdf/double_layer.cpp through build().
 #if defined(BILAYER_SDF_TRIANGLE_LANES_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_TRIANGLE_LANES_H
 #undef BILAYER_SDF_TRIANGLE_LANES_H
@@ -25,16 +25,16 @@ namespace {
 
 /// One row per component, one column per triangle.
 struct TriangleLanes {
-    static constexpr std::size_t most = 8;
+    static constexpr std::size_t largest = 8;
     /// As many triangles as there are double lanes.
-    using Wide = hn::CappedTag<double, most>;
+    using Wide = hn::CappedTag<double, largest>;
     /// The same count of floats.
     using Small = hn::Rebind<float, Wide>;
 
-    alignas(64) float world[3][3][most];  ///< corners, then axes [m]
-    alignas(64) std::int32_t triangles[most];
-    alignas(64) double corners[3][3][most];  ///< the same [voxels]
-    alignas(64) double normal[3][most], length[most], longest2[most];
+    alignas(64) float world[3][3][largest];  ///< corners, then axes [m]
+    alignas(64) std::int32_t triangles[largest];
+    alignas(64) double corners[3][3][largest];  ///< the same [voxels]
+    alignas(64) double normal[3][largest], length[largest], longest2[largest];
 
     /// Loads the corners of some triangles. Prefetches the next ones, since they are scattered in memory.
     void load(const Mesh& mesh, std::span<const std::uint32_t> indices, std::size_t first, std::size_t count) {
@@ -65,14 +65,14 @@ struct TriangleLanes {
         return points;
     }
 
-    static void store(const VectorLanes<Wide>& points, double (&rows)[3][most]) {
+    static void store(const VectorLanes<Wide>& points, double (&rows)[3][largest]) {
         hn::Store(points.x, Wide(), rows[0]);
         hn::Store(points.y, Wide(), rows[1]);
         hn::Store(points.z, Wide(), rows[2]);
     }
 
     /// Returns one triangle's column.
-    static glm::dvec3 at(const double (&rows)[3][most], std::size_t lane) {
+    static glm::dvec3 at(const double (&rows)[3][largest], std::size_t lane) {
         return glm::dvec3(rows[0][lane], rows[1][lane], rows[2][lane]);
     }
 };

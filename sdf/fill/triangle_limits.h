@@ -1,5 +1,5 @@
 // The box that a triangle must overlap to be relevant.
-// Tested by tests/sdf/exact.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
 #include <glm/common.hpp>

@@ -1,6 +1,6 @@
 // The voxels of a block in SIMD chunks. Highway includes this file once for each instruction set: only between
 // HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/sdf/exact.cpp.
+// Tested by tests/sdf/exact.cpp through build().
 #if defined(BILAYER_SDF_VOXEL_CHUNKS_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_VOXEL_CHUNKS_H
 #undef BILAYER_SDF_VOXEL_CHUNKS_H

@@ -1,5 +1,5 @@
 // Assembles filled blocks into grids. Expensive to include: it includes OpenVDB.
-// Tested by tests/sdf/build.cpp.
+// Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <oneapi/tbb/enumerable_thread_specific.h>

@@ -66,10 +66,10 @@ void checkMoved(const Mesh& before, const Mesh& after, std::span<const std::uint
     }
     const std::size_t first = tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, count, trianglesPerTask), count,
-        [&](const auto& range, std::size_t least) {
-            for (std::size_t i = range.begin(); i < std::min(range.end(), least); ++i)
+        [&](const auto& range, std::size_t smallest) {
+            for (std::size_t i = range.begin(); i < std::min(range.end(), smallest); ++i)
                 if (!listed[i] && !sameCorners(before, after, i)) return i;
-            return least;
+            return smallest;
         },
         [](std::size_t a, std::size_t b) { return std::min(a, b); });
     if (first < count)

@@ -1,6 +1,6 @@
 // The dirty region of a field when a part of its mesh moves: the cells within reach of the moved triangles, at their
 // old or their new position.
-// Tested by tests/sdf/rebuild.cpp.
+// Tested by tests/sdf/rebuild.cpp through rebuild().
 #pragma once
 
 #include <cstdint>

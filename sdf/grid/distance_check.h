@@ -1,5 +1,5 @@
 // Checks the distances of a level set that comes from a file; internal.
-// Tested by tests/sdf/vdb_io.cpp.
+// Tested by tests/sdf/vdb_io.cpp through readVdb().
 #pragma once
 
 #include <bilayer/sdf/level_set.h>

@@ -46,7 +46,7 @@ Assembler::Plain plainBlocks(const BuildOptions& options, Sign sign) {
 
 }  // namespace
 
-FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const BlockFiller* device)
+FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device)
     : mesh_(mesh), options_(options), device_(device), progress_(options.progress) {
     progress_.poll();
     validate(mesh_);

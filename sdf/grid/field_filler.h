@@ -1,6 +1,6 @@
 // The state of one build. It fills a field by one method of distances and one of signs, again if needed, and makes a
 // LevelSet of the last one.
-// Tested by tests/sdf/build.cpp.
+// Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <atomic>
@@ -8,7 +8,6 @@
 #include <functional>
 #include <string>
 
-#include <bilayer/sdf/build.h>
 #include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/options.h>
@@ -28,7 +27,7 @@ class FieldFiller {
     /// @param options  valid
     /// @param device   fills the blocks; null: the CPU
     /// Throws as validate() and checkSize() do. The arguments must outlive the filler.
-    FieldFiller(const Mesh& mesh, const BuildOptions& options, const BlockFiller* device);
+    FieldFiller(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device);
 
     /// Fills by a method that finds signs itself.
     void fillWithOwnSigns();
@@ -66,7 +65,7 @@ class FieldFiller {
 
     const Mesh& mesh_;
     const BuildOptions& options_;
-    const BlockFiller* device_;
+    const DeviceFiller* device_;
     BuildTimes times_;
     Stopwatch total_;
     Progress progress_;

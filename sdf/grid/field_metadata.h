@@ -1,5 +1,5 @@
 // The metadata of a field: how it was built, from what, and how its signs were found.
-// Tested by tests/sdf/build.cpp.
+// Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // Updates the field of a mesh after some of its triangles have moved.
-// Tested by tests/sdf/rebuild.cpp.
+// Tested by tests/sdf/rebuild.cpp through rebuild().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Fills a field by a sign method, and by another one or from a repaired mesh if the signs contradict each other.
-// Tested by tests/sdf/sign_choice.cpp.
+// Tested by tests/sdf/sign_choice.cpp through build().
 #pragma once
 
 namespace bilayer::detail {

@@ -1,5 +1,5 @@
 // Reads formats that have no reader of their own here, by Assimp; internal.
-// Tested by tests/sdf/scene_io.cpp.
+// Tested by tests/sdf/scene_io.cpp through readScene().
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // Detects whether a polygon in the plane crosses itself; internal.
-// Tested by tests/sdf/triangulate.cpp.
+// Tested by tests/sdf/triangulate.cpp through triangulate().
 #pragma once
 
 #include <glm/vec2.hpp>

@@ -1,5 +1,5 @@
 // Triangulates a polygon in the plane by ear clipping; internal.
-// Tested by tests/sdf/triangulate.cpp.
+// Tested by tests/sdf/triangulate.cpp through triangulate().
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // Checks that an input path is a file.
-// Tested by tests/sdf/mesh_io.cpp.
+// Tested by tests/sdf/mesh_io.cpp through readMesh().
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // Loads a glTF file and the buffers that it refers to into tinygltf's model; internal.
-// Tested by tests/sdf/read_gltf.cpp.
+// Tested by tests/sdf/read_gltf.cpp through readScene().
 #pragma once
 
 #include <filesystem>

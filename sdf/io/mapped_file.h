@@ -1,5 +1,5 @@
 // Memory-mapped input files.
-// Tested by tests/sdf/mesh_readers.cpp.
+// Tested by tests/sdf/mesh_readers.cpp through readMesh().
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // Writes meshes as OBJ, STL and PLY files.
-// Tested by tests/sdf/mesh_io.cpp.
+// Tested by tests/sdf/mesh_io.cpp through writeMesh().
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // Binary data of a PLY file: values of each type in either byte order; internal.
-// Tested by tests/sdf/ply_reader.cpp.
+// Tested by tests/sdf/ply_reader.cpp through readMesh().
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // Elements of PLY files, read property by property: text, and binary records of any form; internal.
-// Tested by tests/sdf/ply_reader.cpp.
+// Tested by tests/sdf/ply_reader.cpp through readMesh().
 #pragma once
 
 #include <glm/vec3.hpp>

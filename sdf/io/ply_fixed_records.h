@@ -1,5 +1,5 @@
 // Elements of binary PLY files whose records all have the same length: read in parallel at known offsets; internal.
-// Tested by tests/sdf/ply_reader.cpp.
+// Tested by tests/sdf/ply_reader.cpp through readMesh().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The header of a PLY file: its elements and their properties; internal.
-// Tested by tests/sdf/ply_reader.cpp.
+// Tested by tests/sdf/ply_reader.cpp through readMesh().
 #pragma once
 
 #include <cstddef>

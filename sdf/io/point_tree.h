@@ -1,5 +1,5 @@
 // A set of points in the plane with search by region; internal.
-// Tested by tests/sdf/triangulate.cpp.
+// Tested by tests/sdf/triangulate.cpp through triangulate().
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // Common parts of scene readers: meshes placed by node transforms; internal.
-// Tested by tests/sdf/scene_io.cpp.
+// Tested by tests/sdf/scene_io.cpp through readScene().
 #pragma once
 
 #include <glm/mat4x4.hpp>

@@ -1,5 +1,5 @@
 // Text records, mostly one per line, read in parallel; internal.
-// Tested by tests/sdf/mesh_readers.cpp.
+// Tested by tests/sdf/mesh_readers.cpp through readMesh().
 #pragma once
 
 #include <algorithm>

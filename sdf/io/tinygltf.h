@@ -1,6 +1,6 @@
 // tinygltf as the glTF readers use it: without images, and in its own namespace, so that a program may contain another
 // build of it; internal.
-// Tested by tests/sdf/read_gltf.cpp.
+// Tested by tests/sdf/read_gltf.cpp through readScene().
 #pragma once
 
 #define TINYGLTF_NO_STB_IMAGE

@@ -1,5 +1,5 @@
 // Writes grids in OpenVDB's file format, compressed on all threads; internal.
-// Tested by tests/sdf/vdb_io.cpp.
+// Tested by tests/sdf/vdb_io.cpp through readVdb().
 #pragma once
 
 #include <string>

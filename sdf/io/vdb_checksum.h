@@ -1,5 +1,5 @@
 // The checksum line at the end of .vdb files; internal.
-// Tested by tests/sdf/vdb_io.cpp.
+// Tested by tests/sdf/vdb_io.cpp through readVdb().
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // Checks the lengths stored in a .vdb file. OpenVDB allocates memory for them, and reads into it, before it checks
 // them.
-// Tested by tests/sdf/vdb_io.cpp.
+// Tested by tests/sdf/vdb_io.cpp through readVdb().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // A .vdb file as a stream whose lengths are checked before they are used; internal.
-// Tested by tests/sdf/vdb_io.cpp.
+// Tested by tests/sdf/vdb_io.cpp through readVdb().
 #pragma once
 
 #include <cstdint>

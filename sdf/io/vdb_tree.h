@@ -1,5 +1,5 @@
 // Checks the lengths stored in the trees of a .vdb file; internal.
-// Tested by tests/sdf/vdb_io.cpp.
+// Tested by tests/sdf/vdb_io.cpp through readVdb().
 #pragma once
 
 #include <array>

@@ -10,7 +10,8 @@
 #include <span>
 #include <string>
 
-#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh.h>
+#include <bilayer/sdf/options.h>
 
 namespace bilayer::detail {
 
@@ -69,8 +70,12 @@ struct FillJob {
     FillParameters layers;  ///< of the double layer method
 };
 
-/// Fills the blocks of a mesh's field as build() does, but builds no level set: the filler keeps its results. Calls the
-/// filler again for another sign method if it counts conflicts. Throws as build() does.
-void fillOnly(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler);
+/// What a BlockFiller holds.
+struct DeviceFiller {
+    std::string backend;  ///< "opencl"
+    std::string device;   ///< the device's name
+    /// Fills the blocks of one job. A build passes on any exception that it throws.
+    std::function<void(const FillJob&)> fill;
+};
 
 }  // namespace bilayer::detail

@@ -1,5 +1,5 @@
 // What follows from the options of a build alone: whether they are valid, the reach of distances, the error bound.
-// Tested by tests/sdf/build.cpp.
+// Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <bilayer/sdf/options.h>

@@ -1,5 +1,5 @@
 // The size of a build, estimated before any allocation.
-// Tested by tests/sdf/build.cpp.
+// Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <bilayer/sdf/mesh.h>

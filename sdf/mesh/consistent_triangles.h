@@ -1,5 +1,5 @@
 // Finds the triangles of a mesh that must keep or change their orientation together, so that neighbours agree.
-// Tested by tests/sdf/orient.cpp.
+// Tested by tests/sdf/orient.cpp through orient().
 #pragma once
 
 #include <cstdint>

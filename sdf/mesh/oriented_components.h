@@ -1,5 +1,5 @@
 // The consistently oriented components of a mesh, with their volume and their border.
-// Tested by tests/sdf/orient.cpp.
+// Tested by tests/sdf/orient.cpp through orient().
 #pragma once
 
 #include <cstdint>

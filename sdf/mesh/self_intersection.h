@@ -1,5 +1,5 @@
 // Finds where a surface self-intersects.
-// Tested by tests/sdf/inspect.cpp.
+// Tested by tests/sdf/inspect.cpp through inspect().
 #pragma once
 
 #include <cstddef>

@@ -8,8 +8,8 @@
 #include <bit>
 #include <numeric>
 
+#include "sdf/base/equal_points.h"
 #include "sdf/base/polled_loop.h"
-#include "sdf/mesh/equal_points.h"
 
 namespace bilayer::detail {
 namespace {

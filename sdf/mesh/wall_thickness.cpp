@@ -132,8 +132,9 @@ class ExitSearch {
             const Vec uRoom = hn::Mul(away, hn::Sqrt(ac2)), vRoom = hn::Mul(away, hn::Sqrt(ab2));
             const Vec u = hn::Add(dot(ac, side), uRoom), v = hn::Sub(vRoom, dot(ab, side));
             // both sides of this comparison have the margins of u and v
-            const Vec most = hn::Add(hn::Add(facing, facingRoom), hn::Mul(hn::Set(tag, 2.0f), hn::Add(uRoom, vRoom)));
-            const Mask within = hn::And(hn::Ge(hn::Min(u, v), hn::Zero(tag)), hn::Le(hn::Add(u, v), most));
+            const Vec largest =
+                hn::Add(hn::Add(facing, facingRoom), hn::Mul(hn::Set(tag, 2.0f), hn::Add(uRoom, vRoom)));
+            const Mask within = hn::And(hn::Ge(hn::Min(u, v), hn::Zero(tag)), hn::Le(hn::Add(u, v), largest));
             for (unsigned bits = bitsOf(hn::And(faces, within)); bits != 0; bits &= bits - 1)
                 nearest_ =
                     std::min(nearest_, exitThrough(ray_, Triangle(leaf, lane + std::size_t(std::countr_zero(bits)))));

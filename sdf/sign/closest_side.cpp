@@ -12,9 +12,6 @@ namespace {
 /// Points this close together coincide [voxels]. The value is far above the rounding of doubles at 1e6 voxels from the
 /// origin, and far below the resolution of the field.
 constexpr double samePlace = 1e-7;
-/// Relative to the longest edge: with a smaller height, a projection onto the plane is no better than one onto the
-/// edges.
-constexpr double flatness = 1e-10;
 /// Relative to the sum of their weights: unit normals with a smaller sum nearly cancel out.
 constexpr double cancelled = 1e-2;
 /// Minimum solid angle, of triangles with sides of about a voxel. Below it, the side on which a path passes an edge is
@@ -67,7 +64,7 @@ bool sameCorners(const TriangleCorners& a, const TriangleCorners& b) {
 glm::dvec3 closestToOrigin(const TriangleCorners& c) {
     const glm::dvec3 ab = c[1] - c[0], ac = c[2] - c[0], n = glm::cross(ab, ac);
     const double n2 = glm::dot(n, n), longest2 = longestEdge2(c);
-    if (n2 > flatness * flatness * longest2 * longest2) {
+    if (n2 > minRelativeHeight * minRelativeHeight * longest2 * longest2) {
         // Projects inside all three edges: the projection onto the plane is the closest point.
         const auto inner = [&](const glm::dvec3& p, const glm::dvec3& q) {
             return glm::dot(glm::cross(q - p, -p), n) >= 0;

@@ -16,6 +16,9 @@
 
 namespace bilayer::detail {
 
+/// Tolerance of a search for all triangles that can be nearest to a point [voxels].
+inline constexpr float sideSlack = 1e-3f;
+
 /// The side of a point. `undecided` where the normals nearly cancel out. They have no meaning at a vertex where two
 /// parts of the surface touch, and little meaning at the sharp end of a needle triangle.
 enum class Side { outside, inside, undecided };

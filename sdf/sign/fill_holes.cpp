@@ -127,13 +127,13 @@ class MinArea {
         : loop_(loop), size_(loop.size()), areas_(size_ * size_, 0), middles_(size_ * size_, 0) {
         for (std::size_t span = 2; span < size_; ++span)
             for (std::size_t first = 0; first + span < size_; ++first) {
-                double& least = areas_[first * size_ + first + span];
-                least = std::numeric_limits<double>::max();
+                double& smallest = areas_[first * size_ + first + span];
+                smallest = std::numeric_limits<double>::max();
                 for (std::size_t middle = first + 1; middle < first + span; ++middle) {
                     const double area = areas_[first * size_ + middle] + areas_[middle * size_ + first + span] +
                                         glm::length(areaOf(mesh, triangle(first, middle, first + span)));
-                    if (!(area < least)) continue;
-                    least = area;
+                    if (!(area < smallest)) continue;
+                    smallest = area;
                     middles_[first * size_ + first + span] = unsigned(middle);
                 }
             }
@@ -196,10 +196,10 @@ bool isBorder(const Mesh& mesh, const Lid& lid, const WindingNumber& winding) {
 // A crack does not change winding numbers.
 std::optional<Lid> lidOf(const Mesh& mesh, const Loop& loop, double crack, const WindingNumber& winding) {
     if (loop.size() < 3 || loop.size() > maxEdges) return std::nullopt;
-    const MinArea least(mesh, loop);
-    const bool isCrack = 2 * least.area() <= crack * lengthOf(mesh, loop);
-    if (!isCrack && !isBorder(mesh, least.lid(), winding)) return std::nullopt;
-    return least.lid();
+    const MinArea smallest(mesh, loop);
+    const bool isCrack = 2 * smallest.area() <= crack * lengthOf(mesh, loop);
+    if (!isCrack && !isBorder(mesh, smallest.lid(), winding)) return std::nullopt;
+    return smallest.lid();
 }
 
 // Removes fill triangles of almost no area ("caps"), such as between an edge and the vertices on it across a crack. An

@@ -45,9 +45,9 @@ struct Cube {
 
 class Search {
   public:
-    Search(const Mesh& mesh, double least, Progress* progress)
+    Search(const Mesh& mesh, double minimum, Progress* progress)
         : mesh_(mesh),
-          minRadius_(0.5 * least),
+          minRadius_(0.5 * minimum),
           progress_(progress),
           tree_(mesh, progress),
           winding_(mesh, progress),
@@ -107,9 +107,9 @@ class Search {
     double distance(const glm::dvec3& point, double bound) const {
         tree_.descend(
             [&](const Bounds& box) {
-                const glm::dvec3 beside =
+                const glm::dvec3 across =
                     glm::max(glm::max(glm::dvec3(box.lower) - point, point - glm::dvec3(box.upper)), glm::dvec3(0));
-                return glm::length(beside) <= bound;
+                return glm::length(across) <= bound;
             },
             [&](unsigned triangle) {
                 const glm::uvec3& t = mesh_.triangles[triangle];
@@ -143,8 +143,8 @@ class Search {
 
 }  // namespace
 
-Hole widestHole(const Mesh& mesh, double least, Progress* progress) {
-    return Search(mesh, least, progress).run();
+Hole widestHole(const Mesh& mesh, double minimum, Progress* progress) {
+    return Search(mesh, minimum, progress).run();
 }
 
 }  // namespace bilayer::detail

@@ -21,6 +21,6 @@ struct Hole {
 /// orient()).
 /// @param least     minimum width [m], positive
 /// @param progress  polled for cancellation, unless null
-Hole widestHole(const Mesh& mesh, double least, Progress* progress = nullptr);
+Hole widestHole(const Mesh& mesh, double minimum, Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

@@ -130,7 +130,7 @@ SignChoice chooseSign(const Mesh& mesh, Progress* progress) {
 SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress) {
     const SignChoice choice = chooseSign(mesh, progress);
     if (choice.sign != Sign::normals || choice.repaired || bounding(mesh, progress).nothing <= maxIdle) return choice;
-    return chooseFor(orient(mesh, progress), "closed and oriented, but of sheets", progress);
+    return chooseFor(orient(mesh, progress), "closed and oriented, but of two-sided open surfaces", progress);
 }
 
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress) {

@@ -4,8 +4,9 @@
 #include <optional>
 #include <string>
 
-#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
+#include <bilayer/sdf/options.h>
 
 namespace bilayer::detail {
 

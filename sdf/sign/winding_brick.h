@@ -1,5 +1,5 @@
 // The cells of one brick of OctreeCells, found by voxel. One task signs a brick by winding numbers.
-// Tested by tests/sdf/winding.cpp.
+// Tested by tests/sdf/winding.cpp through build().
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // Signs of the space between leaves by winding numbers.
-// Tested by tests/sdf/winding.cpp.
+// Tested by tests/sdf/winding.cpp through build().
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
 // The side of a point by the winding number, and how far that side is valid.
-// Tested by tests/sdf/winding.cpp.
+// Tested by tests/sdf/winding.cpp through signByWinding().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The gradient of the winding number away from the surface of an open mesh.
-// Tested by tests/sdf/winding.cpp.
+// Tested by tests/sdf/winding.cpp through signByWinding().
 #pragma once
 
 #include <cstddef>

@@ -75,7 +75,7 @@ std::size_t check(const PointSampler& sampler, const Crowd& crowd, float margin)
             queries.back().other = j;
         }
     FoundPoints found;
-    sampler.sample(bodies, queries, found);
+    sampler.data().sample(bodies, queries, found);
     REQUIRE(found.begins.size() == queries.size() + 1);
 
     std::size_t total = 0, differing = 0;
@@ -188,10 +188,11 @@ TEST_CASE("the processor takes over if the sampler fails half-way, with the same
     CAPTURE(seed);
     const auto works = openclPointSampler(openDevice());
     int left = 5;
-    const PointSampler breaks{"opencl", "a device", [&](const auto& bodies, const auto& queries, FoundPoints& found) {
-                                  if (left-- == 0) throw std::runtime_error("the device is gone (as this test has it)");
-                                  works.sample(bodies, queries, found);
-                              }};
+    const PointSampler breaks({"opencl", "a device", [&](const auto& bodies, const auto& queries, FoundPoints& found) {
+                                   if (left-- == 0)
+                                       throw std::runtime_error("the device is gone (as this test has it)");
+                                   works.data().sample(bodies, queries, found);
+                               }});
     const Played expected = play({}, seed), played = play(breaks, seed);
     CHECK(left == -1);
     CHECK(std::count_if(played.sampled.begin(), played.sampled.end(), [](int pairs) { return pairs > 0; }) == 5);

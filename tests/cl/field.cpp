@@ -97,17 +97,17 @@ BuildOptions optionsFor(const Mesh& mesh, float resolution, Method method) {
 }
 
 // A field that stays on the device gives the same answers as one that is built there and downloaded.
-void checkResident(const Mesh& mesh, const BuildOptions& build, const OpenclOptions& options = {}) {
+void checkBuiltOnDevice(const Mesh& mesh, const BuildOptions& build, const OpenclOptions& options = {}) {
     const Device device = openDevice();
     const Field field(bilayer::build(mesh, build, openclFiller(device, options)));
-    const DeviceField resident(device, mesh, build, options);
-    CHECK(resident.bounds().lower == field.bounds().lower);
-    CHECK(resident.bounds().upper == field.bounds().upper);
+    const DeviceField onDevice(device, mesh, build, options);
+    CHECK(onDevice.bounds().lower == field.bounds().lower);
+    CHECK(onDevice.bounds().upper == field.bounds().upper);
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     const std::vector<glm::vec3> points = allKindsOfPoints(random, field.bounds(), 100000);
-    checkSameSamples(field, points, samplesOf(resident, points));
+    checkSameSamples(field, points, samplesOf(onDevice, points));
 }
 
 }  // namespace
@@ -216,12 +216,12 @@ TEST_CASE("a field built to stay on the device answers as the same field from th
                              shapes::torusKnot(2, 3, 1.f, 0.3f)}) {
         BuildOptions build = optionsFor(mesh, forGpu ? 24 : 90, method);
         CAPTURE(mesh.triangles.size(), forGpu, method == Method::exact);
-        checkResident(mesh, build, options);
+        checkBuiltOnDevice(mesh, build, options);
         build.exteriorWidthVoxels = 4.5f;
         build.interiorWidthVoxels = 1.25f;
-        checkResident(mesh, build, options);
+        checkBuiltOnDevice(mesh, build, options);
         build.exteriorWidthVoxels = 0.7f;
-        checkResident(mesh, build, options);
+        checkBuiltOnDevice(mesh, build, options);
     }
 }
 
@@ -232,7 +232,7 @@ TEST_CASE("fields of the corpus stay on the device") {
         if (!path) continue;
         CAPTURE(name, method == Method::exact);
         const Mesh mesh = readMesh(*path);
-        checkResident(mesh, optionsFor(mesh, 100, method));
+        checkBuiltOnDevice(mesh, optionsFor(mesh, 100, method));
     }
 }
 
@@ -242,14 +242,14 @@ TEST_CASE("fields stay on the device of a mesh that is repaired, and of such who
         if (!path) continue;
         CAPTURE(name);
         const Mesh mesh = readMesh(*path);
-        checkResident(mesh, optionsFor(mesh, 64, Method::exact));
+        checkBuiltOnDevice(mesh, optionsFor(mesh, 64, Method::exact));
     }
 }
 
 TEST_CASE("a field far from the origin stays on the device") {
     const Mesh mesh =
         transformed(shapes::sphere(1.f, 3), glm::mat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -900, 700, -1300, 1));
-    checkResident(mesh, optionsFor(mesh, 40, Method::exact));
+    checkBuiltOnDevice(mesh, optionsFor(mesh, 40, Method::exact));
 }
 
 TEST_CASE("what needs the processor cannot stay on the device, nor what exceeds its memory") {

@@ -30,11 +30,11 @@ using Catch::Matchers::Contains;
 namespace {
 
 // Voxels along the longest side, and the mapping under test. A GPU's mapping is very slow on a CPU.
-struct Way {
+struct MappingCase {
     KernelMapping mapping;
     float resolution;
 };
-const Way blockPerItem{KernelMapping::blockPerItem, 90}, groupPerBlock{KernelMapping::groupPerBlock, 24};
+const MappingCase blockPerItem{KernelMapping::blockPerItem, 90}, groupPerBlock{KernelMapping::groupPerBlock, 24};
 
 BuildOptions optionsFor(const Mesh& mesh, float resolution, Method method = Method::doubleLayer) {
     BuildOptions options;
@@ -165,20 +165,20 @@ std::vector<Shape> allShapes() {
 }  // namespace
 
 TEST_CASE("OpenCL and TBB agree on shapes") {
-    const Way way = GENERATE(blockPerItem, groupPerBlock);
+    const MappingCase variant = GENERATE(blockPerItem, groupPerBlock);
     const Method method = GENERATE(Method::exact, Method::doubleLayer);
     for (const Shape& shape : allShapes()) {
-        CAPTURE(shape.name, way.resolution, int(method));
-        BuildOptions options = optionsFor(shape.mesh, way.resolution, method);
+        CAPTURE(shape.name, variant.resolution, int(method));
+        BuildOptions options = optionsFor(shape.mesh, variant.resolution, method);
         options.triangles = true;
-        checkFillers(shape.mesh, options, {.mapping = way.mapping});
+        checkFillers(shape.mesh, options, {.mapping = variant.mapping});
     }
 }
 
 TEST_CASE("OpenCL and TBB agree without triangles") {
-    const Way way = GENERATE(blockPerItem, groupPerBlock);
+    const MappingCase variant = GENERATE(blockPerItem, groupPerBlock);
     const Mesh mesh = shapes::torus(1.f, 0.4f);
-    checkFillers(mesh, optionsFor(mesh, way.resolution), {.mapping = way.mapping});
+    checkFillers(mesh, optionsFor(mesh, variant.resolution), {.mapping = variant.mapping});
 }
 
 TEST_CASE("OpenCL and TBB agree on the corpus") {
@@ -195,10 +195,10 @@ TEST_CASE("OpenCL and TBB agree on the corpus") {
 }
 
 TEST_CASE("OpenCL and TBB agree by the paper to the letter, by recursion and with other parameters") {
-    const Way way = GENERATE(blockPerItem, groupPerBlock);
+    const MappingCase variant = GENERATE(blockPerItem, groupPerBlock);
     const bool triangles = GENERATE(false, true);
     const Mesh mesh = shapes::box({1.f, 0.6f, 0.3f}, 2);
-    BuildOptions options = optionsFor(mesh, way.resolution);
+    BuildOptions options = optionsFor(mesh, variant.resolution);
     options.triangles = triangles;
     SECTION("letter") {
         options.doubleLayer.fillGaps = false;
@@ -216,7 +216,7 @@ TEST_CASE("OpenCL and TBB agree by the paper to the letter, by recursion and wit
         options.exteriorWidthVoxels = 4.5f;
         options.interiorWidthVoxels = 1.25f;
     }
-    checkFillers(mesh, options, {.mapping = way.mapping});
+    checkFillers(mesh, options, {.mapping = variant.mapping});
 }
 
 TEST_CASE("OpenCL and TBB agree far from the origin") {
@@ -233,14 +233,14 @@ TEST_CASE("OpenCL and TBB agree on triangles of very different size, however wid
         {shapes::cone(0.01f, 2, 24), shapes::moved(shapes::sphere(0.1f, 4), glm::vec3(0.5f, 0, 0)),
          transformed(shapes::box({0.4f, 0.9f, 0.8f}),
                      glm::rotate(glm::translate(glm::mat4(1), glm::vec3(-1, 0, 0)), 0.3f, glm::vec3(1, 2, 3)))});
-    const Way way = GENERATE(blockPerItem, groupPerBlock);
+    const MappingCase variant = GENERATE(blockPerItem, groupPerBlock);
     const Method method = GENERATE(Method::exact, Method::doubleLayer);
-    BuildOptions options = optionsFor(mesh, way.resolution, method);
+    BuildOptions options = optionsFor(mesh, variant.resolution, method);
     const float width = GENERATE(1.f, 6.f);
     options.exteriorWidthVoxels = width;
     options.interiorWidthVoxels = 2;
-    CAPTURE(way.resolution, int(method), width);
-    checkFillers(mesh, options, {.mapping = way.mapping});
+    CAPTURE(variant.resolution, int(method), width);
+    checkFillers(mesh, options, {.mapping = variant.mapping});
 }
 
 TEST_CASE("OpenCL and TBB agree on signs that are asked for, and on meshes that are no solids") {
@@ -259,8 +259,8 @@ TEST_CASE("blocks whose sides the nearest normals leave open come from the proce
     const Mesh mesh = shapes::join({shapes::moved(shapes::box(glm::vec3(0.5f)), glm::vec3(0.5f)),
                                     shapes::moved(shapes::box(glm::vec3(0.5f)), glm::vec3(-0.5f))});
     BuildOptions options = optionsFor(mesh, 40, Method::exact);
-    const Way way = GENERATE(blockPerItem, groupPerBlock);
-    checkFillers(mesh, options, {.mapping = way.mapping});
+    const MappingCase variant = GENERATE(blockPerItem, groupPerBlock);
+    checkFillers(mesh, options, {.mapping = variant.mapping});
 }
 
 TEST_CASE("OpenCL and TBB agree where faces of opposite sides lie on each other") {
@@ -269,10 +269,10 @@ TEST_CASE("OpenCL and TBB agree where faces of opposite sides lie on each other"
     if (GENERATE(false, true))
         for (glm::uvec3& t : inner.triangles) std::swap(t.x, t.y);
     const Mesh mesh = shapes::join({shapes::box({1.f, 0.6f, 0.5f}), inner});
-    const Way way = GENERATE(blockPerItem, groupPerBlock);
-    BuildOptions options = optionsFor(mesh, 2 * way.resolution / 3, Method::exact);
+    const MappingCase variant = GENERATE(blockPerItem, groupPerBlock);
+    BuildOptions options = optionsFor(mesh, 2 * variant.resolution / 3, Method::exact);
     options.sign = GENERATE(Sign::normals, Sign::automatic);
-    checkFillers(mesh, options, {.mapping = way.mapping});
+    checkFillers(mesh, options, {.mapping = variant.mapping});
 }
 
 TEST_CASE("a little device memory means many batches and the same field") {
@@ -369,6 +369,6 @@ TEST_CASE("one device serves two builds at once") {
 
 TEST_CASE("the filler tells its name and device") {
     const Device device = openDevice();
-    CHECK(openclFiller(device).backend == "opencl");
-    CHECK(openclFiller(device).device == device.info().name);
+    CHECK(openclFiller(device).backend() == "opencl");
+    CHECK(openclFiller(device).device() == device.info().name);
 }

@@ -165,13 +165,13 @@ TEST_CASE("points are sampled again once a device that was lost is back") {
                                   {1, 0, glm::mat3(1), {-1.5f, 0, 0}, 1, 0.1f}};
     const PointSampler sampler = openclPointSampler(openDevice());
     FoundPoints expected, found;
-    sampler.sample(bodies, queries, expected);
+    sampler.data().sample(bodies, queries, expected);
     REQUIRE(expected.points.size() > 10);
     failing = kernels;
     callsLeft = 0;
-    CHECK_THROWS_WITH(sampler.sample(bodies, queries, found),
+    CHECK_THROWS_WITH(sampler.data().sample(bodies, queries, found),
                       Contains("clEnqueueNDRangeKernel") && Contains("CL_DEVICE_NOT_AVAILABLE"));
     callsLeft = INT_MAX;
-    sampler.sample(bodies, queries, found);
+    sampler.data().sample(bodies, queries, found);
     CHECK(found.begins == expected.begins);
 }

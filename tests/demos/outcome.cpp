@@ -53,13 +53,13 @@ TEST_CASE("energy rises by the most that it climbs above what it once was") {
 
 TEST_CASE("a stage tells what a falling body does, and how deep bodies overlap") {
     const auto ball = demo::makeThing(shapes::sphere(0.1f, 4), {0.01f});
-    const auto play = [&](float way) {
+    const auto play = [&](float offset) {
         demo::Stage stage("fall", {.stepsPerSecond = 100, .stepsPerFrame = 10});
         stage.add(ball, {.mass = 2, .linearDamping = 0, .angularDamping = 0}, {{0, 0, 5}}, {});
         // two bodies that overlap permanently, and a moving one that overlaps one of them
         stage.add(ball, {}, {{0, 0, 0}}, {});
         stage.add(ball, {}, {{0.15f, 0, 0}}, {});
-        stage.add(ball, {.mass = 1}, {{3 + way, 0, 0}}, {});
+        stage.add(ball, {.mass = 1}, {{3 + offset, 0, 0}}, {});
         stage.run(0.5);
         CHECK(stage.time() == Approx(0.5));
         return stage.finish({});

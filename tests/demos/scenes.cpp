@@ -187,8 +187,9 @@ TEST_CASE("nuts under ten times their weight run and stay as they should") {
     const Outcome outcome = demo::nuts(options);
     CHECK(outcome.stepMs.size() < slow.stepMs.size() / 2);
     // they hop within their play, which changes the advance of a rotation by as much
-    for (const char* name : {"nuts that should run and stuck", "unevenness of angular speed",
-                             "turn of nuts that should stay", "way of nuts that should stay", "deepest penetration"}) {
+    for (const char* name :
+         {"nuts that should run and stuck", "unevenness of angular speed", "rotation of nuts that should stay",
+          "displacement of nuts that should stay", "deepest penetration"}) {
         CAPTURE(name, outcome.criterion(name).value);
         CHECK(outcome.criterion(name).met());
     }

@@ -1,5 +1,8 @@
-// Each unit of a library, X.h and X.cpp, has tests: tests/LIBRARY/X.cpp, or the file that the comment at the top of the
-// unit names by a line "Tested by tests/...cpp."
+// Each unit of a library, X.h and X.cpp, has tests: tests/LIBRARY/X.cpp, or the files that the comment at the top of
+// the unit names by a line "Tested by tests/....cpp." Such a file includes the header or uses a name that it declares.
+// A unit that only other units use says through which name the test reaches it: "Tested by tests/....cpp through
+// build()."
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <map>
 #include <regex>
@@ -12,20 +15,60 @@ using namespace bilayer::test;
 
 namespace {
 
-// The test files that the comment at the top of a file names.
-std::set<std::string> namedTests(const std::string& text) {
-    std::set<std::string> tests;
-    static const std::regex line(R"re(^// Tested by tests/.*\.cpp\.$)re"), path(R"re(tests/[a-zA-Z0-9_/]+\.cpp)re");
+// The line of a unit that names its tests.
+struct TestLine {
+    std::set<std::string> files;
+    std::string through;  // the name that the tests use; empty: one of the unit itself
+};
+
+// The line in the comment at the top of a file.
+TestLine namedTests(const std::string& text) {
+    TestLine tests;
+    static const std::regex line(R"re(^// Tested by (tests/.*\.cpp)(?: through (?:\w+::)*(\w+)(?:\(\))?)?\.$)re");
+    static const std::regex path(R"re(tests/[a-zA-Z0-9_/]+\.cpp)re");
     for (std::size_t begin = 0; text.compare(begin, 2, "//") == 0;) {
         const std::size_t end = text.find('\n', begin);
         const std::string comment = text.substr(begin, end - begin);
-        if (std::regex_match(comment, line))
-            for (std::sregex_iterator named(comment.begin(), comment.end(), path), last; named != last; ++named)
-                tests.insert(named->str());
+        std::smatch match;
+        if (std::regex_match(comment, match, line)) {
+            tests.through = match[2].str();
+            const std::string files = match[1].str();
+            for (std::sregex_iterator named(files.begin(), files.end(), path), last; named != last; ++named)
+                tests.files.insert(named->str());
+        }
         if (end == std::string::npos) break;
         begin = end + 1;
     }
     return tests;
+}
+
+// The types, functions and constants that a header declares at namespace scope, where lines are not indented.
+std::set<std::string> declaredNames(const std::string& text) {
+    static const std::regex pattern(
+        R"re((?:^|\n)(?:template <[^\n]*> )?(?:)re"
+        R"re((?:struct|class|enum class|enum|union) (?:alignas\([^)\n]*\) )?(\w+)|using (\w+) =|)re"
+        R"re(inline constexpr [\w:<>* ]+ (\w+)|[a-zA-Z](?:[\w:<>,&*\[\] ]*[ &*>])(\w+)\())re");
+    std::set<std::string> names;
+    for (std::sregex_iterator found(text.begin(), text.end(), pattern), last; found != last; ++found)
+        for (std::size_t group = 1; group < found->size(); ++group)
+            if ((*found)[group].matched) names.insert((*found)[group].str());
+    return names;
+}
+
+// The words of a text: runs of letters, digits and underscores.
+std::set<std::string> wordsOf(const std::string& text) {
+    static const std::regex word(R"re(\w+)re");
+    return {std::sregex_token_iterator(text.begin(), text.end(), word), {}};
+}
+
+// Whether a test reaches a unit as the unit's line states.
+bool reaches(const std::string& test, const std::string& unit, const std::string& header, const std::string& through) {
+    if (test.find("\"" + unit + ".h\"") != std::string::npos) return true;
+    if (test.find("<bilayer/" + unit + ".h>") != std::string::npos) return true;
+    const std::set<std::string> used = wordsOf(test);
+    if (!through.empty()) return used.count(through) > 0;
+    const std::set<std::string> names = declaredNames(header);
+    return std::any_of(names.begin(), names.end(), [&](const std::string& name) { return used.count(name) > 0; });
 }
 
 // The test file of a unit's own name: "sdf/fill/exact" has "tests/sdf/exact.cpp".
@@ -41,16 +84,23 @@ TEST_CASE("each unit has a test file of its name, or names the one that covers i
     std::string wrong;
     std::size_t count = 0;
     for (const auto& [library, ignored] : floors) {
-        std::map<std::string, std::set<std::string>> units;  // with the tests that they name
-        for (const std::string& file : codeIn(library))
-            units[file.substr(0, file.rfind('.'))].merge(namedTests(contents(file)));
+        std::map<std::string, TestLine> units;
+        for (const std::string& file : codeIn(library)) {
+            const TestLine line = namedTests(contents(file));
+            TestLine& all = units[file.substr(0, file.rfind('.'))];
+            all.files.insert(line.files.begin(), line.files.end());
+            if (!line.through.empty()) all.through = line.through;
+        }
         count += units.size();
-        for (const auto& [unit, named] : units) {
-            if (named.empty() && !fs::exists(root / ownTest(library, unit)))
+        for (const auto& [unit, line] : units) {
+            if (line.files.empty() && !fs::exists(root / ownTest(library, unit)))
                 wrong +=
                     unit + ": there is no " + ownTest(library, unit) + ", and its header has no line \"Tested by\"\n";
-            for (const std::string& test : named)
-                if (!fs::exists(root / test)) wrong += unit + " names " + test + ", which does not exist\n";
+            for (const std::string& test : line.files)
+                if (!fs::exists(root / test))
+                    wrong += unit + " names " + test + ", which does not exist\n";
+                else if (!reaches(contents(test), unit, contents(unit + ".h"), line.through))
+                    wrong += unit + " names " + test + ", which neither includes it nor uses a name of it\n";
         }
     }
     CHECK(wrong == "");
@@ -59,7 +109,21 @@ TEST_CASE("each unit has a test file of its name, or names the one that covers i
 
 TEST_CASE("a line that names tests is found in the comment at the top, and only there") {
     const std::set<std::string> both{"tests/sdf/exact.cpp", "tests/sdf/flood.cpp"};
-    CHECK(namedTests("// A unit.\n// Tested by tests/sdf/exact.cpp and tests/sdf/flood.cpp.\n#pragma once\n") == both);
-    CHECK(namedTests("// A unit.\n#pragma once\n// Tested by tests/sdf/exact.cpp.\n").empty());
+    CHECK(namedTests("// A unit.\n// Tested by tests/sdf/exact.cpp and tests/sdf/flood.cpp.\n#pragma once\n").files ==
+          both);
+    CHECK(namedTests("// A unit.\n#pragma once\n// Tested by tests/sdf/exact.cpp.\n").files.empty());
+    CHECK(namedTests("// Tested by tests/sdf/exact.cpp through Field::sample().\n").through == "sample");
     CHECK(ownTest("integration/bullet", "integration/bullet/detail/convex") == "tests/bullet/convex.cpp");
+}
+
+TEST_CASE("a test reaches a unit that it includes, names, or uses through the stated name") {
+    const std::string header =
+        "struct Tree {\n    int size() const;\n};\nvoid grow(Tree& tree);\n"
+        "inline constexpr int maxDepth = 3;\n";
+    CHECK(declaredNames(header) == std::set<std::string>{"Tree", "grow", "maxDepth"});
+    CHECK(reaches("#include \"sdf/bvh/tree.h\"\n", "sdf/bvh/tree", header, ""));
+    CHECK(reaches("grow(oak);\n", "sdf/bvh/tree", header, ""));
+    CHECK_FALSE(reaches("growAll(oak.size());\n", "sdf/bvh/tree", header, ""));
+    CHECK(reaches("build(mesh);\n", "sdf/bvh/tree", header, "build"));
+    CHECK_FALSE(reaches("rebuild(mesh);\n", "sdf/bvh/tree", header, "build"));
 }

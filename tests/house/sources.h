@@ -22,6 +22,29 @@ inline const std::map<std::string, std::vector<std::string>> floors{
     {"integration/fluid", {"detail"}},
 };
 
+/// The lowest private folder that may include a public header: the one whose code the header's functions need. No
+/// private folder may include a public header that is not listed.
+inline const std::map<std::string, std::string> publicFloors{
+    {"sdf/options.h", "base"},
+    {"sdf/mesh.h", "base"},
+    {"sdf/level_set.h", "base"},
+    {"sdf/grids.h", "base"},
+    {"sdf/mesh_io.h", "io"},
+    {"sdf/inspect.h", "mesh"},
+    {"collider/query.h", "field"},
+    {"collider/pose.h", "field"},
+    {"collider/mass.h", "field"},
+    {"collider/field.h", "field"},
+    {"collider/collider.h", "contact"},
+    {"collider/contact.h", "contact"},
+    {"collider/distance.h", "contact"},
+    {"cl/device.h", "detail"},
+    {"cl/filler.h", "detail"},
+    {"integration/bullet/shape.h", "detail"},
+    {"integration/bullet/dispatcher.h", "detail"},
+    {"integration/fluid/seed.h", "detail"},
+};
+
 inline const std::vector<std::string> folders{"sdf",   "cl",    "collider", "integration",
                                               "tools", "demos", "bench",    "tests"};
 

@@ -359,7 +359,7 @@ TEST_CASE("a build can be cancelled at any moment, whatever the method") {
 }
 
 TEST_CASE("what a filler throws ends the build") {
-    const BlockFiller broken{"broken", "", [](const FillJob&) { throw std::runtime_error("the device is on fire"); }};
+    const BlockFiller broken({"broken", "", [](const FillJob&) { throw std::runtime_error("the device is on fire"); }});
     CHECK_THROWS_WITH(build(shapes::sphere(1, 2), {.voxelSize = 0.1f, .method = Method::doubleLayer}, broken),
                       "the device is on fire");
 }

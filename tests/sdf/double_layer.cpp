@@ -210,8 +210,8 @@ TEST_CASE("beyond the band, voxels lie on the side that exact distances give the
                 std::abs(*voxel) > 2 * options.voxelSize && (*voxel < 0) != (values.getValue(voxel.getCoord()) < 0);
         return wrong;
     };
-    const glm::mat4 turn = glm::rotate(glm::mat4(1), 0.7f, glm::vec3(1, 2, 0.5f));
-    const Mesh sphere = transformed(shapes::unevenSphere(0.0013f), turn);
+    const glm::mat4 rotation = glm::rotate(glm::mat4(1), 0.7f, glm::vec3(1, 2, 0.5f));
+    const Mesh sphere = transformed(shapes::unevenSphere(0.0013f), rotation);
     BuildOptions options{.voxelSize = voxelSizeFor(sphere, 200)};
     options.doubleLayer.epsilon = 0.25f;
     options.doubleLayer.delta = 0.1f;

@@ -78,8 +78,8 @@ test::Band anyBand(Random& random) {
 Mesh anyPose(const Mesh& mesh, Random& random) {
     const glm::vec3 axis(uniform(random, -1, 1), uniform(random, -1, 1), 1.5f);
     const glm::vec3 shift(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
-    const glm::mat4 turn = glm::rotate(glm::mat4(1), uniform(random, 0, 6.28f), glm::normalize(axis));
-    return transformed(mesh, glm::translate(glm::mat4(1), shift) * turn);
+    const glm::mat4 rotation = glm::rotate(glm::mat4(1), uniform(random, 0, 6.28f), glm::normalize(axis));
+    return transformed(mesh, glm::translate(glm::mat4(1), shift) * rotation);
 }
 
 // A wedge whose edge, along y at the origin, is `thickness` wide one metre away.

@@ -15,8 +15,8 @@ namespace {
 
 // Points on a lattice, where rays meet edges and vertices, and in between.
 void checkSides(const Mesh& mesh, unsigned seed) {
-    const std::function<bool(float)> nobody;
-    Progress progress(nobody);
+    const std::function<bool(float)> noListener;
+    Progress progress(noListener);
     std::atomic<std::size_t> asked = 0;
     const MeshJob job{mesh, 0.1f, 3, false, true, [](const FilledBlocks&) {}, progress, {}, &asked};
     FallbackSign fallbackSign(job);

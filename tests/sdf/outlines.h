@@ -196,10 +196,10 @@ inline void bridge(Outline& outline, std::span<const Outline> holes) {
             bridges.push_back({x * x + y * y, i, j});
         }
     std::sort(bridges.begin(), bridges.end(), [](auto& a, auto& b) { return a.length < b.length; });
-    for (const Bridge& way : bridges) {
+    for (const Bridge& joint : bridges) {
         const std::size_t n = outline.size();
-        const Point &a = outline[way.from], &b = hole[way.to];
-        const Point &before = outline[(way.from + n - 1) % n], &after = outline[(way.from + 1) % n];
+        const Point &a = outline[joint.from], &b = hole[joint.to];
+        const Point &before = outline[(joint.from + n - 1) % n], &after = outline[(joint.from + 1) % n];
         const bool convex = sideOf(before, a, after) > 0;
         const bool left = sideOf(before, a, b) > 0, right = sideOf(a, after, b) > 0;
         if (!(convex ? left && right : left || right)) continue;
@@ -214,9 +214,9 @@ inline void bridge(Outline& outline, std::span<const Outline> holes) {
         };
         if (meets(outline) || std::any_of(holes.begin(), holes.end(), meets)) continue;
         Outline walk;
-        for (std::size_t j = 0; j <= hole.size(); ++j) walk.push_back(hole[(way.to + j) % hole.size()]);
+        for (std::size_t j = 0; j <= hole.size(); ++j) walk.push_back(hole[(joint.to + j) % hole.size()]);
         walk.push_back(a);
-        outline.insert(outline.begin() + long(way.from) + 1, walk.begin(), walk.end());
+        outline.insert(outline.begin() + long(joint.from) + 1, walk.begin(), walk.end());
         return;
     }
     FAIL("no bridge to the hole");

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <random>
 
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/bvh/triangle_tree.h"
@@ -51,14 +52,14 @@ bool isCancelled(Listener& listener, const Work& work) {
 
 // Checks that the callback is called at least `least` times, and that cancelling at any call stops the work.
 template <class Work>
-void checkCancelling(const std::string& what, unsigned least, const Work& work) {
+void checkCancelling(const std::string& what, unsigned minPolls, const Work& work) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
     const unsigned seed = test::seed();
     CAPTURE(what, seed);
     std::mt19937 random(seed);
     Listener content{always};
     CHECK_FALSE(isCancelled(content, work));
-    CHECK(content.asked >= least);
+    CHECK(content.asked >= minPolls);
     for (int i = 0; i < 12; ++i) {
         Listener listener{i == 0 ? 1 : 1 + unsigned(random() % content.asked)};
         CAPTURE(content.asked, listener.patience);

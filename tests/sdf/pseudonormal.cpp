@@ -38,8 +38,8 @@ Blocks fill(const Mesh& mesh, float voxelSize, float reach = 3, bool sign = true
     Blocks all;
     std::mutex mutex;
     std::size_t taken = 0;
-    const std::function<bool(float)> nobody;
-    Progress progress(nobody);
+    const std::function<bool(float)> noListener;
+    Progress progress(noListener);
     fillPseudonormal({mesh, voxelSize, reach, true, sign,
                       [&](const FilledBlocks& blocks) {
                           const std::lock_guard lock(mutex);
@@ -113,7 +113,7 @@ void report(const Errors& errors) {
 }
 
 // Compares all voxels around a mesh, or about `most` of them.
-void check(const Mesh& mesh, float voxelSize, float reach = 3, bool sign = true, double most = 2e4) {
+void check(const Mesh& mesh, float voxelSize, float reach = 3, bool sign = true, double maxVoxels = 2e4) {
     const unsigned seed = test::seed();
     CAPTURE(seed, voxelSize, reach, mesh.triangles.size());
     std::mt19937 random(seed);
@@ -123,7 +123,7 @@ void check(const Mesh& mesh, float voxelSize, float reach = 3, bool sign = true,
         upper(glm::ceil(glm::dvec3(box.upper) / double(voxelSize) + double(reach) + 2.0));
     Errors errors;
     const glm::dvec3 size = upper - lower + 1;
-    const bool all = size.x * size.y * size.z <= most;
+    const bool all = size.x * size.y * size.z <= maxVoxels;
     if (all) {
         for (int x = lower.x; x <= upper.x; ++x)
             for (int y = lower.y; y <= upper.y; ++y)
@@ -138,7 +138,7 @@ void check(const Mesh& mesh, float voxelSize, float reach = 3, bool sign = true,
     std::vector<std::tuple<int, int, int>> origins;
     for (const auto& entry : blocks) origins.push_back(entry.first);
     std::uniform_int_distribution<std::size_t> whichBlock(0, origins.size() - 1);
-    for (std::size_t i = 0; i < std::size_t(most); ++i) {
+    for (std::size_t i = 0; i < std::size_t(maxVoxels); ++i) {
         glm::ivec3 v;
         if (i % 2 == 0) {
             const auto [x, y, z] = origins[whichBlock(random)];
@@ -314,8 +314,8 @@ TEST_CASE("pseudonormal: the bytes do not depend on the number of threads") {
 
 TEST_CASE("pseudonormal: an exception of the sink ends the work") {
     const Mesh mesh = shapes::sphere(20, 3);
-    const std::function<bool(float)> nobody;
-    Progress progress(nobody);
+    const std::function<bool(float)> noListener;
+    Progress progress(noListener);
     const auto broken = [](const FilledBlocks&) { throw Cancelled(); };
     CHECK_THROWS_AS(fillPseudonormal({mesh, 0.3f, 3, false, true, broken, progress}), Cancelled);
 }

@@ -28,10 +28,10 @@ void put(BlockMask& mask, int voxel) {
 // Distances of all magnitudes, plus one extra row, which must not matter.
 std::vector<float> anyDistances(Random& random) {
     std::uniform_real_distribution<float> scale(0.3f, 1.2f), part(0, 1);
-    const float most = scale(random);
+    const float largest = scale(random);
     std::vector<float> distances(blockVoxels + blockSide, farAway);
     for (std::size_t i = 0; i < std::size_t(blockVoxels); ++i)
-        distances[i] = random() % 16 == 0 ? farAway : most * part(random);
+        distances[i] = random() % 16 == 0 ? farAway : largest * part(random);
     return distances;
 }
 

@@ -23,10 +23,10 @@ std::vector<glm::dvec3> samples(const Tile& tile) {
 
 // Algorithm 1 of the paper, literally.
 std::vector<glm::dvec3> algorithm1(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double epsilon,
-                                   int most) {
+                                   int largest) {
     const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
     int n = int(std::ceil(std::sqrt(area / epsilon)));
-    if (n > most) n = most;
+    if (n > largest) n = largest;
     const glm::dvec3 s1 = (b - a) / double(n), s2 = (c - b) / double(n), s3 = (c - a) / double(n);
     std::vector<glm::dvec3> chosen;
     glm::dvec3 ps = (a + (a + s1) + (a + s3)) / 3.0;

@@ -167,40 +167,42 @@ struct RotatedBox {
 };
 
 double toSegment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
-    const glm::dvec3 way = b - a;
-    const double t = glm::dot(way, way) > 0 ? std::clamp(glm::dot(p - a, way) / glm::dot(way, way), 0.0, 1.0) : 0.0;
-    return glm::length(p - a - t * way);
+    const glm::dvec3 edge = b - a;
+    const double t =
+        glm::dot(edge, edge) > 0 ? std::clamp(glm::dot(p - a, edge) / glm::dot(edge, edge), 0.0, 1.0) : 0.0;
+    return glm::length(p - a - t * edge);
 }
 
 // The distance to the surface of one box outside another: to a face if the projection on it is free, else to the
 // borders of its free part.
 double toFree(const glm::dvec3& p, const RotatedBox& box, const RotatedBox& other) {
-    double least = std::numeric_limits<double>::infinity();
+    double smallest = std::numeric_limits<double>::infinity();
     for (const auto& face : box.faces()) {
         const glm::dvec3 normal = glm::normalize(glm::cross(face[1] - face[0], face[2] - face[0]));
         const glm::dvec3 foot = p - glm::dot(normal, p - face[0]) * normal;
         const glm::dvec3 local = glm::abs(box.toLocal(foot)) - box.half;
         if (std::max({local.x, local.y, local.z}) < 1e-12 && !other.holds(foot))
-            least = std::min(least, glm::length(p - foot));
+            smallest = std::min(smallest, glm::length(p - foot));
         for (std::size_t i = 0; i < 4; ++i) {
             const glm::dvec3 &a = face[i], &b = face[(i + 1) % 4];
             const auto [first, last] = other.within(a, b);
             if (first > last) {
-                least = std::min(least, toSegment(p, a, b));
+                smallest = std::min(smallest, toSegment(p, a, b));
                 continue;
             }
-            if (first > 0) least = std::min(least, toSegment(p, a, a + first * (b - a)));
-            if (last < 1) least = std::min(least, toSegment(p, a + last * (b - a), b));
+            if (first > 0) smallest = std::min(smallest, toSegment(p, a, a + first * (b - a)));
+            if (last < 1) smallest = std::min(smallest, toSegment(p, a + last * (b - a), b));
         }
         // the border of the other box on the face; the face's own border is handled above
         const auto hole = other.clipped(face);
         for (std::size_t i = 0; i < hole.size(); ++i) {
             const glm::dvec3 &a = hole[i], &b = hole[(i + 1) % hole.size()];
             const glm::dvec3 middle = glm::abs(other.toLocal(0.5 * (a + b))) - other.half;
-            if (std::abs(std::max({middle.x, middle.y, middle.z})) < 1e-9) least = std::min(least, toSegment(p, a, b));
+            if (std::abs(std::max({middle.x, middle.y, middle.z})) < 1e-9)
+                smallest = std::min(smallest, toSegment(p, a, b));
         }
     }
-    return least;
+    return smallest;
 }
 
 // The signed distance of two balls whose surfaces intersect.
@@ -211,14 +213,14 @@ double toBalls(const glm::dvec3& p, const glm::dvec3& c1, double r1, const glm::
     const double apart = glm::length(c2 - c1), along = 0.5 * (apart + (r1 * r1 - r2 * r2) / apart);
     const double ring = std::sqrt(r1 * r1 - along * along);
     const glm::dvec3 q = p - c1 - along * axis, radial = q - glm::dot(q, axis) * axis;
-    double least = std::hypot(glm::dot(q, axis), glm::length(radial) - ring);
+    double smallest = std::hypot(glm::dot(q, axis), glm::length(radial) - ring);
     const auto addCap = [&](const glm::dvec3& c, double r, const glm::dvec3& other, double otherRadius) {
         const glm::dvec3 foot = c + r * glm::normalize(p - c);
-        if (glm::length(foot - other) > otherRadius) least = std::min(least, glm::length(p - foot));
+        if (glm::length(foot - other) > otherRadius) smallest = std::min(smallest, glm::length(p - foot));
     };
     addCap(c1, r1, c2, r2);
     addCap(c2, r2, c1, r1);
-    return -least;
+    return -smallest;
 }
 
 }  // namespace

@@ -109,7 +109,7 @@ TEST_CASE("narrowing keeps all nodes near the voxels and opens large ones") {
         const glm::vec3 lower = glm::floor(glm::vec3(place(random), place(random), place(random)));
         const VoxelBox voxels{lower, lower + 7.f};
         NodeList leaves;
-        narrow(tree, wholeTree(tree), voxels, 3, 0, leaves);
+        collectNodes(tree, wholeTree(tree), voxels, 3, 0, leaves);
         std::set<std::uint32_t> found(leaves.nodes.begin(), leaves.nodes.begin() + std::ptrdiff_t(leaves.count));
         CHECK(found.size() == leaves.count);
         std::size_t wrong = 0;

@@ -135,9 +135,9 @@ TEST_CASE("the expansion about a far cluster is of second order") {
     const WindingNumber winding(mesh);
     double near = 0, far = 0;
     for (int i = 0; i < 100; ++i) {
-        const glm::dvec3 way = glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
+        const glm::dvec3 direction = glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
         const auto error = [&](double distance) {
-            return std::abs(winding(distance * way) - test::windingNumber(mesh, distance * way));
+            return std::abs(winding(distance * direction) - test::windingNumber(mesh, distance * direction));
         };
         near = std::max(near, error(40));
         far = std::max(far, error(80));

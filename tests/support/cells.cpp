@@ -33,9 +33,9 @@ Mesh solidOf(const Planes& planes, const std::function<bool(const glm::ivec3& ce
             for (cell.z = 0; cell.z < cells.z; ++cell.z)
                 for (int axis = 0; axis < 3 && isFilled(cell); ++axis)
                     for (const int side : {0, 1}) {
-                        glm::ivec3 beside = cell;
-                        beside[axis] += side ? 1 : -1;
-                        if (!isFilled(beside)) addFace(cell, axis, side);
+                        glm::ivec3 neighbour = cell;
+                        neighbour[axis] += side ? 1 : -1;
+                        if (!isFilled(neighbour)) addFace(cell, axis, side);
                     }
     return mesh;
 }

@@ -18,9 +18,9 @@ inline ContactOptions unfiltered(float margin, bool exact = false) {
 
 /// The minimum separation; infinity without contacts.
 inline float minDistance(const std::vector<Contact>& contacts) {
-    float least = std::numeric_limits<float>::infinity();
-    for (const Contact& contact : contacts) least = std::min(least, contact.distance);
-    return least;
+    float smallest = std::numeric_limits<float>::infinity();
+    for (const Contact& contact : contacts) smallest = std::min(smallest, contact.distance);
+    return smallest;
 }
 
 /// The contact of minimum separation. Fails the test without contacts.

@@ -122,7 +122,7 @@ Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& gro
     world.add(ground, 0, {0, 0, 0});
     const btTransform at = start(*collider, shape.frame(), place);
     const btRigidBody& body = *world.add(shape, 1, at.getOrigin(), at.getRotation());
-    double least = energyOf(body), gain = 0;
+    double smallest = energyOf(body), gain = 0;
     Drop result;
     for (int step = 0; step < int(stepsPerSecond * seconds); ++step) {
         world.dynamics.stepSimulation(1 / stepsPerSecond, 1, 1 / stepsPerSecond);
@@ -131,8 +131,8 @@ Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& gro
             result.gain = std::numeric_limits<double>::infinity();
             return result;
         }
-        least = std::min(least, now);
-        gain = std::max(gain, now - least);
+        smallest = std::min(smallest, now);
+        gain = std::max(gain, now - smallest);
         result.aside += contactsAside(world.dispatcher, body);
     }
     result.gain = gain / (gravity * double(dropHeight));  // of 1 kg

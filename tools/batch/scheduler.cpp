@@ -70,7 +70,7 @@ class Scheduler {
     }
 
   private:
-    // Starts what fits beside the running workers.
+    // Starts what fits next to the running workers.
     void start() {
         while (!waiting_.empty() && canStartSmall()) {
             const BatchMesh* mesh = waiting_.front();

@@ -1,5 +1,5 @@
 // Collision algorithms that Bullet's tables hold for pairs with a field.
-// Tested by tests/bullet/pairs.cpp.
+// Tested by tests/bullet/pairs.cpp through bullet::Shape.
 #pragma once
 
 #include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>

@@ -1,5 +1,5 @@
 // The sweep of an object over a step that has ended.
-// Tested by tests/bullet/continuous_collision.cpp.
+// Tested by tests/bullet/continuous_collision.cpp through WorldExtensions.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>

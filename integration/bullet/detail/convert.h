@@ -1,5 +1,5 @@
 // Conversions between Bullet's vectors and GLM's.
-// Tested by tests/bullet/pairs.cpp.
+// Tested by tests/bullet/convex.cpp.
 #pragma once
 
 #include <LinearMath/btTransform.h>

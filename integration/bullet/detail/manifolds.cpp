@@ -6,6 +6,7 @@
 #include <typeinfo>
 #include <utility>
 
+#include "integration/bullet/detail/contact_groups.h"
 #include "integration/bullet/detail/convert.h"
 #include "integration/bullet/detail/velocity.h"
 
@@ -15,8 +16,6 @@ using namespace bilayer::detail;
 
 namespace {
 
-// A new contact continues an old one whose normal is within about 25 degrees of its own.
-constexpr float sameDirection = 0.9f;
 // A contact sticks below this fraction of the friction limit. A drift along the surface beyond the second value is not
 // pulled back [fractions of Continuity::sameWithin].
 constexpr float stickingLimit = 0.98f, maxDrift = 0.25f;

@@ -3,7 +3,7 @@
 // For two concave shapes, Bullet's own tables hold an algorithm that does nothing, so neither shape is called when such
 // a pair meets. A shape is called by its world only for its bounding box: once a step for each body, and once more for
 // a dynamic body, for the predicted pose.
-// Tested by tests/bullet/stock.cpp.
+// Tested by tests/bullet/stock.cpp through bullet::Shape.
 #pragma once
 
 #include <LinearMath/btTransform.h>

@@ -1,5 +1,5 @@
 // A pair of bodies, one of them a field: from their shapes to contacts in Bullet.
-// Tested by tests/bullet/pairs.cpp.
+// Tested by tests/bullet/pairs.cpp through bullet::Shape.
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>

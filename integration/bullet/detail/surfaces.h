@@ -4,7 +4,7 @@
 // - std::optional<glm::vec3> depenetration(point, radius): the displacement to the surface of a sphere that is inside;
 //   none if unknown;
 // - a bound() of the distance to their surface. Open surfaces have isNear() instead.
-// Tested by tests/bullet/continuous_collision.cpp.
+// Tested by tests/bullet/continuous_collision.cpp through WorldExtensions.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>

@@ -1,5 +1,5 @@
 // Time of impact of two shapes in a step.
-// Tested by tests/bullet/continuous_collision.cpp.
+// Tested by tests/bullet/continuous_collision.cpp through WorldExtensions.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>

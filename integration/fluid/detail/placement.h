@@ -1,5 +1,5 @@
 // The check of a body's placement.
-// Tested by tests/fluid/seed.cpp.
+// Tested by tests/fluid/seed.cpp through seed().
 #pragma once
 
 #include <bilayer/integration/fluid/seed.h>

@@ -1,5 +1,5 @@
 // Resamples bodies into a fluid's own voxels.
-// Tested by tests/fluid/seed.cpp.
+// Tested by tests/fluid/seed.cpp through seed().
 #pragma once
 
 #include <openvdb/openvdb.h>

@@ -1,7 +1,7 @@
 """Training samples for a neural SDF of a dirty mesh: near the surface and uniform, with exact signed distances.
 
 The mesh has holes, flipped faces, and a second solid that overlaps it; signs come from winding numbers. Writes
-`neural_samples.npz` beside the picture.
+`neural_samples.npz` next to the picture.
 """
 
 from pathlib import Path

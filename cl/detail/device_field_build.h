@@ -1,5 +1,5 @@
-// Builds a field that stays on a device; kernels in resident.cl.
-// Tested by tests/cl/field.cpp.
+// Builds a field that stays on a device; kernels in field_build.cl.
+// Tested by tests/cl/field.cpp through DeviceField.
 #pragma once
 
 #include <bilayer/sdf/build.h>
@@ -34,7 +34,7 @@ struct DeviceLayout {
 inline constexpr std::uint64_t fillPart = 4;
 
 /// A field in a device's memory, and the times of its build.
-struct ResidentField {
+struct BuiltDeviceField {
     DeviceLayout layout;
     OpenclTimes times;
 };
@@ -44,7 +44,7 @@ struct ResidentField {
 ///
 /// Throws what build() throws, cl::Error, DeviceError, and std::invalid_argument if the method or the sign method needs
 /// the processor.
-ResidentField buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
-                            const OpenclOptions& options, DeviceMemory& memory);
+BuiltDeviceField buildDeviceField(const Device& device, const Mesh& mesh, const BuildOptions& build,
+                                  const OpenclOptions& options, DeviceMemory& memory);
 
 }  // namespace bilayer::detail

@@ -1,5 +1,5 @@
 // Finds vertices of a mesh with equal coordinates.
-// Tested by tests/sdf/mesh.cpp.
+// Tested by tests/sdf/mesh.cpp through weld().
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -1,6 +1,6 @@
 // Each batch of blocks that the fill leaves on the device is trimmed to the band at once, into a page of its own. After
 // the last batch, when their number is known, the pages are copied into the layout.
-#include "cl/detail/resident_field.h"
+#include "cl/detail/device_field_build.h"
 
 #include <algorithm>
 #include <array>
@@ -14,26 +14,27 @@
 #include "cl/detail/enqueue.h"
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/queue_guard.h"
+#include "sdf/grid/field_build.h"
 #include "sdf/leaf/band.h"
 #include "sdf/leaf/blocks.h"
 
 namespace bilayer::detail {
 
-extern const char* const resident_cl;  // the text of resident.cl
+extern const char* const field_build_cl;  // the text of field_build.cl
 
 namespace {
 
 constexpr std::size_t itemsAlongParts = 32;   // along z, which is contiguous in memory
-constexpr cl_int unknownEntry = -3;           // UNKNOWN of resident.cl
-constexpr cl_float maxParts = 16;             // MAX_PARTS of resident.cl
+constexpr cl_int unknownEntry = -3;           // UNKNOWN of field_build.cl
+constexpr cl_float maxParts = 16;             // MAX_PARTS of field_build.cl
 constexpr const char* purpose = "the field";  // of memory, for error texts
 
-// `Widths` of resident.cl.
+// `Widths` of field_build.cl.
 struct KernelWidths {
     cl_float exterior, interior, voxelSize;
 };
 
-// `Summary` of resident.cl.
+// `Summary` of field_build.cl.
 struct Summary {
     static constexpr cl_int low = std::numeric_limits<cl_int>::min(), high = std::numeric_limits<cl_int>::max();
 
@@ -56,12 +57,12 @@ struct Page {
     cl::Buffer origins, values, sides;
 };
 
-class ResidentFill {
+class DeviceFieldBuilder {
   public:
-    ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job);
-    ResidentFill(const ResidentFill&) = delete;
-    ResidentFill& operator=(const ResidentFill&) = delete;
-    ResidentField run();
+    DeviceFieldBuilder(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job);
+    DeviceFieldBuilder(const DeviceFieldBuilder&) = delete;
+    DeviceFieldBuilder& operator=(const DeviceFieldBuilder&) = delete;
+    BuiltDeviceField run();
 
   private:
     void addPage(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks);
@@ -111,7 +112,8 @@ class ResidentFill {
     QueueGuard guard_;  // commands in flight use the blocks of the host
 };
 
-ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job)
+DeviceFieldBuilder::DeviceFieldBuilder(const Device& device, const OpenclOptions& options, DeviceMemory& memory,
+                                       const FillJob& job)
     : device_(device.impl()),
       options_(options),
       memory_(memory),
@@ -119,11 +121,11 @@ ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, D
       gpuMapping_(wantsGroups(device_, options.mapping)),
       widths_{job.options.exteriorWidthVoxels, job.options.interiorWidthVoxels, job.mesh.voxelSize},
       timing_(options.profile),
-      program_(buildProgram(device_, resident_cl, commonBuildOptions(device_, gpuMapping_))),
+      program_(buildProgram(device_, field_build_cl, commonBuildOptions(device_, gpuMapping_))),
       summary_(memory.allocate(sizeof(Summary), purpose)),
       guard_(device_.queue) {}
 
-ResidentField ResidentFill::run() {
+BuiltDeviceField DeviceFieldBuilder::run() {
     const Summary none;
     device_.queue.enqueueWriteBuffer(summary_, CL_TRUE, 0, sizeof none, &none);
     MeshJob mesh = job_.mesh;
@@ -145,7 +147,7 @@ ResidentField ResidentFill::run() {
     return {std::move(layout_), times};
 }
 
-void ResidentFill::addPage(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
+void DeviceFieldBuilder::addPage(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
     if (blocks == 0) return;
     const auto buffer = [&](std::uint64_t each) { return memory_.allocate(blocks * each, purpose); };
     const Page page{cl_uint(blocks), buffer(sizeof(glm::ivec3)), buffer(blockVoxels * sizeof(float)),
@@ -157,7 +159,7 @@ void ResidentFill::addPage(const cl::Buffer& origins, const cl::Buffer& distance
     pages_.push_back(page);
 }
 
-void ResidentFill::addHostBlocks() {
+void DeviceFieldBuilder::addHostBlocks() {
     if (hostOrigins_.empty()) return;
     const auto uploaded = [&](const auto& data) {
         return memory_.upload(data.data(), data.size() * sizeof data[0], purpose,
@@ -170,7 +172,7 @@ void ResidentFill::addHostBlocks() {
     memory_.free(distances);
 }
 
-Summary ResidentFill::readSummary() {
+Summary DeviceFieldBuilder::readSummary() {
     Summary summary;
     device_.queue.enqueueReadBuffer(summary_, CL_TRUE, 0, sizeof summary, &summary, nullptr,
                                     timing_.event(Timing::Command::download));
@@ -178,7 +180,7 @@ Summary ResidentFill::readSummary() {
 }
 
 // Computes the frame as FieldLayout's constructor and LevelSet do.
-void ResidentFill::computeFrame() {
+void DeviceFieldBuilder::computeFrame() {
     const Summary summary = readSummary();
     if (summary.activeLower[0] > summary.activeUpper[0])
         throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
@@ -197,7 +199,7 @@ void ResidentFill::computeFrame() {
     layout_.values = memory_.allocate(std::uint64_t(summary.needed) * FieldFrame::blockFloats * sizeof(float), purpose);
 }
 
-void ResidentFill::placeBlocks() {
+void DeviceFieldBuilder::placeBlocks() {
     const KernelFrame frame(layout_.frame);
     const cl_int4 first{{firstVoxel_.x, firstVoxel_.y, firstVoxel_.z, 0}};
     cl::Buffer next = memory_.allocate(sizeof(cl_uint), purpose);
@@ -218,13 +220,13 @@ void ResidentFill::placeBlocks() {
     memory_.free(next);
 }
 
-void ResidentFill::countConflicts() {
+void DeviceFieldBuilder::countConflicts() {
     if (!job_.mesh.conflicts) return;
     enqueueBlocks("countConflicts", entries(), KernelFrame(layout_.frame), layout_.directory, layout_.values, summary_);
     *job_.mesh.conflicts += std::size_t(readSummary().conflicts);
 }
 
-void ResidentFill::computeClearances() {
+void DeviceFieldBuilder::computeClearances() {
     const KernelFrame frame(layout_.frame);
     const glm::ivec3 size = layout_.frame.parts();
     const std::size_t count = std::size_t(size.x) * size.y * size.z;
@@ -254,8 +256,8 @@ void checkJob(const FillJob& job) {
 
 }  // namespace
 
-ResidentField buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
-                            const OpenclOptions& options, DeviceMemory& memory) {
+BuiltDeviceField buildDeviceField(const Device& device, const Mesh& mesh, const BuildOptions& build,
+                                  const OpenclOptions& options, DeviceMemory& memory) {
     OpenclOptions fillOptions = options;
     fillOptions.memoryMiB =
         std::max<std::uint64_t>(1, memoryBudget(device.impl(), options.memoryMiB) / fillPart / mebibyte);
@@ -269,7 +271,7 @@ ResidentField buildResident(const Device& device, const Mesh& mesh, const BuildO
                   checkJob(job);
                   // the first fill had contradictory signs
                   for (cl::Buffer* buffer : {&layout.directory, &layout.centres, &layout.values}) memory.free(*buffer);
-                  ResidentField field = ResidentFill(device, fillOptions, memory, job).run();
+                  BuiltDeviceField field = DeviceFieldBuilder(device, fillOptions, memory, job).run();
                   layout = std::move(field.layout);
                   times += field.times;
               }});

@@ -1,0 +1,123 @@
+// Construction of colliders from meshes and from files.
+// Tested by tests/collider/collider.cpp through Collider.
+#include <bilayer/collider/collider.h>
+#include <bilayer/sdf/build.h>
+#include <fmt/core.h>
+
+#include <atomic>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "collider/contact/collider_data.h"
+#include "sdf/mesh/topology.h"
+#include "sdf/sign/fill_holes.h"
+#include "sdf/sign/sign_choice.h"
+
+namespace bilayer::detail {
+namespace {
+
+// Holes up to this width are cracks, whose rims coincide [voxels].
+constexpr float crackWidth = 0.01f;
+
+std::uint64_t nextId() {
+    static std::atomic<std::uint64_t> made = 0;
+    return ++made;
+}
+
+Mesh withoutCopies(Mesh mesh) {
+    const Topology topology(mesh);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+        if (topology.original[i] == i) mesh.triangles[kept++] = mesh.triangles[i];
+    mesh.triangles.resize(kept);
+    return mesh;
+}
+
+// Mass properties of the mesh if it is closed, otherwise of the field's interior. A solid whose faces were all
+// duplicated back to back has twice its volume in an outward-facing mesh; duplicates are dropped first.
+std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet) {
+    try {
+        if (!balanced(mesh)) return massProperties(levelSet);
+        if (levelSet.sign() == "normals" && levelSet.signReason() != closedAndOriented)
+            if (const Mesh once = withoutCopies(mesh); balanced(once)) return massProperties(once);
+        return massProperties(mesh);
+    } catch (const std::invalid_argument&) {
+        return std::nullopt;  // an open surface: it can only be static
+    }
+}
+
+struct Filled {
+    Mesh mesh;
+    std::optional<LevelSet> levelSet;  // set if holes were filled
+};
+
+// Fills the gaps that winding numbers treat as surface, so that they have distances and normals of their own.
+Filled filledMesh(Mesh outward, const LevelSet& levelSet) {
+    if (levelSet.sign() != "winding" || levelSet.meshHash() == 0) return {std::move(outward), std::nullopt};
+    FilledMesh filled = fillHoles(std::move(outward), double(crackWidth * levelSet.voxelSize()));
+    if (!filled.changed) return {std::move(filled.mesh), std::nullopt};
+    const float voxelSize = levelSet.voxelSize();
+    LevelSet closed = build(filled.mesh, {.voxelSize = voxelSize,
+                                          .exteriorWidthVoxels = levelSet.exteriorWidth() / voxelSize,
+                                          .interiorWidthVoxels = levelSet.interiorWidth() / voxelSize});
+    filled.mesh = outwardMesh(closed, std::move(filled.mesh));
+    return {std::move(filled.mesh), std::move(closed)};
+}
+
+Field fieldOf(const LevelSet& levelSet, const Body& body) {
+    Field samples(levelSet);
+    return body.mesh && body.accuracy != ContactAccuracy::samples ? fieldWithMesh(samples, body.mesh) : samples;
+}
+
+}  // namespace
+
+Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& options) {
+    if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
+    if (options.margin > maxMargin * levelSet.voxelSize())
+        throw std::invalid_argument(
+            fmt::format("collider: a margin of {:g} m is wider than {} voxels", options.margin, maxMargin));
+    Mesh outward = outwardMesh(levelSet, std::move(given));
+    auto mass = massOf(outward, levelSet);
+    Filled filled = filledMesh(std::move(outward), levelSet);
+    const auto mesh = std::make_shared<const Mesh>(std::move(filled.mesh));
+    return {.points = SurfacePoints(*mesh, options.pointSpacingVoxels * levelSet.voxelSize()),
+            .bounds = bounds(*mesh),
+            .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
+            .mass = std::move(mass),
+            .mesh = mesh,
+            .accuracy = options.accuracy,
+            .filled = std::move(filled.levelSet)};
+}
+
+ColliderData::ColliderData(const LevelSet& given, Body made)
+    : body(std::move(made)),
+      field(fieldOf(body.filled ? *body.filled : given, body)),
+      errorMask(field.mesh() && body.accuracy == ContactAccuracy::exactNearFeatures ? InterpolationErrorMask(field)
+                                                                                    : InterpolationErrorMask()),
+      sharpEdges(body.points, field),
+      id(nextId()) {
+    if (!body.mesh) levelSet_ = given;
+}
+
+}  // namespace bilayer::detail
+
+namespace bilayer {
+
+using namespace detail;
+
+Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
+    : data_(std::make_shared<const ColliderData>(levelSet, makeBody(std::move(mesh), levelSet, options))) {}
+
+Collider::Collider(const LevelSet& levelSet)
+    : data_(std::make_shared<const ColliderData>(levelSet, bodyOf(levelSet))) {}
+
+LevelSet withBody(const LevelSet& levelSet, Mesh mesh, const ColliderOptions& options, bool keepMesh) {
+    Body body = makeBody(std::move(mesh), levelSet, options);
+    if (!keepMesh) body.mesh.reset();
+    return withBody(levelSet, body);
+}
+
+}  // namespace bilayer

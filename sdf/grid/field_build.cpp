@@ -1,0 +1,83 @@
+#include "sdf/grid/field_build.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <cstddef>
+#include <stdexcept>
+
+#include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
+#include "sdf/grid/field_filler.h"
+#include "sdf/grid/field_update.h"
+#include "sdf/grid/sign_retry.h"
+#include "sdf/leaf/blocks.h"
+#include "sdf/leaf/build_options.h"
+
+namespace bilayer::detail {
+namespace {
+
+void fillWhole(FieldFiller& field) {
+    if (hasOwnSigns(field.options().method))
+        field.fillWithOwnSigns();
+    else if (field.options().sign == Sign::automatic)
+        fillWithAutomaticSign(field);
+    else
+        fillWithRequestedSign(field);
+}
+
+void refusePrism(const BuildOptions& options) {
+    if (options.method == Method::prism)
+        throw std::invalid_argument("the method prism needs an OpenCL device: give build() its filler");
+}
+
+void refuseForDevices(const BuildOptions& options, const DeviceFiller& device) {
+    if (options.method == Method::pseudonormal)
+        throw std::invalid_argument(
+            fmt::format("the {} back end has no method {}", device.backend, nameOf(options.method)));
+}
+
+template <class Work>
+auto withThreads(int threads, const Work& work) {
+    if (threads == 0) return work();
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+    return tbb::task_arena(threads).execute(work);
+}
+
+}  // namespace
+
+LevelSet buildField(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device) {
+    checkOptions(options);
+    if (device) refuseForDevices(options, *device);
+    if (!device) refusePrism(options);
+    openvdb::initialize();
+    return withThreads(options.threads, [&] {
+        FieldFiller field(mesh, options, device);
+        fillWhole(field);
+        return field.levelSet();
+    });
+}
+
+LevelSet rebuildField(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh,
+                      std::span<const std::uint32_t> moved, const BuildOptions& options) {
+    checkOptions(options);
+    refusePrism(options);
+    return withThreads(options.threads, [&] {
+        FieldFiller field(newMesh, options, nullptr);
+        if (!updateField(field, old, oldMesh, moved)) fillWhole(field);
+        return field.levelSet();
+    });
+}
+
+void fillOnly(const Mesh& mesh, const BuildOptions& options, const DeviceFiller& device) {
+    checkOptions(options);
+    refuseForDevices(options, device);
+    openvdb::initialize();
+    withThreads(options.threads, [&] {
+        FieldFiller field(mesh, options, &device);
+        fillWhole(field);
+    });
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,28 @@
+// A build as a whole: options, threads, and the filling of a field by the methods that the options ask for.
+// Tested by tests/sdf/build.cpp and tests/sdf/rebuild.cpp through build().
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh.h>
+#include <bilayer/sdf/options.h>
+
+namespace bilayer::detail {
+
+struct DeviceFiller;
+
+/// Builds a field, as build() documents.
+/// @param device  fills the blocks; null: the CPU
+LevelSet buildField(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device);
+
+/// Updates a field, as rebuild() documents.
+LevelSet rebuildField(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh,
+                      std::span<const std::uint32_t> moved, const BuildOptions& options);
+
+/// Fills the blocks of a mesh's field as build() does, but builds no level set: the device keeps its results. Fills
+/// again by another sign method if the device counts conflicts. Throws as build() does.
+void fillOnly(const Mesh& mesh, const BuildOptions& options, const DeviceFiller& device);
+
+}  // namespace bilayer::detail
