@@ -298,6 +298,37 @@ TEST_CASE("Edges and vertices of static bodies stop fields as well, however thin
     }
 }
 
+TEST_CASE("A body that hits hard does not penetrate by the speed that the solver leaves") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float half = 0.1f, voxel = 0.2f / 32;
+    Shape cube(exactBox({half, half, half}, voxel)), slab(exactBox({0.4f, 0.4f, 0.1f}, voxel));
+    btStaticPlaneShape plane({0, 0, 1}, 0);
+    btBoxShape box({0.4f, 0.4f, 0.1f});
+    Sheet sheet(0.4f);
+    const struct {
+        const char* name;
+        btCollisionShape& shape;
+        float top;
+    } grounds[] = {{"plane", plane, 0}, {"box", box, 0.1f}, {"field", slab, 0.1f}, {"triangles", *sheet.shape, 0}};
+    for (const auto& ground : grounds)
+        for (int i = 0; i < 40; ++i) {
+            World world;
+            const WorldExtensions guard(world.dynamics);
+            world.dynamics.getSolverInfo().m_numIterations = 2;
+            world.add(ground.shape, 0, {0, 0, -ground.top});
+            const btVector3 axis = toBullet(random.direction());
+            btRigidBody* body = world.add(cube, 1, {0, 0, 0.3f}, btQuaternion(axis, float(random(0, 0.1))));
+            body->setLinearVelocity({float(random(-5, 5)), float(random(-5, 5)), -float(random(20, 80))});
+            for (int n = 0; n < 6; ++n) {
+                world.dynamics.stepSimulation(step, 0);
+                CAPTURE(ground.name, i, n);
+                CHECK(lowest(shapes::box({half, half, half}), body->getWorldTransform()) > -0.5f * voxel);
+            }
+        }
+}
+
 TEST_CASE("Fields without a margin are not passed through either") {
     Shape plate(exactBox({1.f, 1.f, 0.5f * h}, h), {.margin = 0}), ball(exactSphere(0.2f, h), {.margin = 0});
     btSphereShape sphere(0.2f);

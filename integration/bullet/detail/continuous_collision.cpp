@@ -35,7 +35,7 @@ using StoppedPair = std::pair<const btCollisionObject*, const btCollisionObject*
 /// Two bodies that may meet in a step; one of them is fast.
 struct SweptPair {
     BodySweep *a, *b;
-    float margin;     ///< two bodies that are not stopped may approach by up to this; contacts handle that [m]
+    float margin;     ///< two bodies that are not stopped may move by up to this; contacts handle that [m]
     Impact impact{};  ///< the first impact; normal from b to a
     float checkedA = -1, checkedB = -1;  ///< the ends of their sweeps when they were last checked
     Impact stop{};                       ///< where one of them was stopped
@@ -109,15 +109,17 @@ std::optional<float> marginOf(const btCollisionObject& object) {
 /// The pairs in which a fast body may have tunnelled in a step.
 class SweptPairs {
   public:
-    SweptPairs(btDynamicsWorld& world, float seconds) : world_(world), seconds_(seconds) {
+    /// @param fastBefore  fastBodies() of the last step. An iterative solver leaves a part of the speed that it takes
+    ///                    away. So these bodies are checked even if what is left moves them by less than a margin.
+    SweptPairs(btDynamicsWorld& world, float seconds, const std::vector<const btCollisionObject*>& fastBefore)
+        : world_(world), seconds_(seconds), fastBefore_(fastBefore) {
         const btCollisionObjectArray& objects = world.getCollisionObjectArray();
-        float minMargin = std::numeric_limits<float>::infinity();
         for (int i = 0; i < objects.size(); ++i)
-            if (const auto margin = marginOf(*objects[i])) minMargin = std::min(minMargin, *margin);
+            if (const auto margin = marginOf(*objects[i])) minMargin_ = std::min(minMargin_, *margin);
         for (int i = 0; i < objects.size(); ++i) {
             if (!activeDynamicBody(*objects[i])) continue;
             const BodySweep sweep(*objects[i], seconds);
-            if (sweep.maxDisplacement() > minMargin) fast_.push_back(sweep);
+            if (sweep.maxDisplacement() > minMargin_ || wasFast(*objects[i])) fast_.push_back(sweep);
         }
         for (std::size_t i = 0; i < fast_.size(); ++i) find(i);
     }
@@ -160,6 +162,15 @@ class SweptPairs {
         return stopped;
     }
 
+    /// The bodies that this step moves by more than a margin, sorted by address.
+    std::vector<const btCollisionObject*> fastBodies() const {
+        std::vector<const btCollisionObject*> bodies;
+        for (const BodySweep& sweep : fast_)
+            if (sweep.maxDisplacement() > minMargin_) bodies.push_back(&sweep.object());
+        std::sort(bodies.begin(), bodies.end());
+        return bodies;
+    }
+
   private:
     void find(std::size_t i) {
         struct ObjectsInBox : btBroadphaseAabbCallback {
@@ -193,6 +204,10 @@ class SweptPairs {
         return at != fast_.end() && &at->object() == &object;
     }
 
+    bool wasFast(const btCollisionObject& object) const {
+        return std::binary_search(fastBefore_.begin(), fastBefore_.end(), &object);
+    }
+
     bool mayCollide(const btCollisionObject& a, const btCollisionObject& b) const {
         const auto *one = a.getBroadphaseHandle(), *two = b.getBroadphaseHandle();
         return &a != &b && one && two &&
@@ -204,11 +219,13 @@ class SweptPairs {
     void add(BodySweep& a, BodySweep& b) {
         // no field compares less than any margin
         const auto margin = std::max(marginOf(a.object()), marginOf(b.object()));
-        if (margin) pairs_.push_back({&a, &b, *margin});
+        if (margin) pairs_.push_back({&a, &b, wasFast(a.object()) || wasFast(b.object()) ? 0 : *margin});
     }
 
     btDynamicsWorld& world_;
     float seconds_;
+    const std::vector<const btCollisionObject*>& fastBefore_;
+    float minMargin_ = std::numeric_limits<float>::infinity();  ///< of all fields
     std::vector<BodySweep> fast_;  ///< in the world's order
     /// bodies that these may meet, including static ones
     std::unordered_map<const btCollisionObject*, BodySweep> slow_;
@@ -236,9 +253,10 @@ bool ContinuousCollision::serves(const btDispatcher& dispatcher) {
 }
 
 void ContinuousCollision::afterStep(float seconds) {
-    SweptPairs pairs(world_, seconds);
+    SweptPairs pairs(world_, seconds, fastBodies_);
     pairs.resolve();
     stopped_ = pairs.apply(stoppedPairs_);
+    fastBodies_ = pairs.fastBodies();
 }
 
 }  // namespace bilayer::bullet::detail

@@ -27,6 +27,7 @@ class ContinuousCollision {
   private:
     btDynamicsWorld& world_;
     const btDispatcher* const dispatcher_;
+    std::vector<const btCollisionObject*> fastBodies_;  ///< in the last step, sorted
     std::vector<std::pair<const btCollisionObject*, const btCollisionObject*>> stoppedPairs_;  ///< in the last step
     int stopped_ = 0;
 };
