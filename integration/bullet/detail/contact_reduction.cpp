@@ -44,6 +44,8 @@ ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const Patch> la
                      [](const Contact& a, const Contact& b) { return a.remaining() < b.remaining(); });
     if (!isStill(contacts, last)) last = {};
     ReducedContacts result;
+    const bool approaches =
+        std::any_of(contacts.begin(), contacts.end(), [](const Contact& contact) { return contact.approach > 0; });
     const LastContacts lastContacts(last);
     float minExtent = std::numeric_limits<float>::max();
     for (const Group& group : groupByNormal(contacts, lastContacts)) {
@@ -54,7 +56,7 @@ ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const Patch> la
             kept = std::move(first.kept);
             result.reductionError = std::max(result.reductionError, first.reductionError);
             minExtent = std::min(minExtent, extentOf(contacts, group));
-            result.slack = slackTolerances * reductionTolerance * minExtent;
+            result.slack = approaches ? 0 : slackTolerances * reductionTolerance * minExtent;
         }
         for (std::size_t k = 0; k < kept.size(); ++k) {
             if (k % MANIFOLD_CACHE_SIZE == 0) result.patches.emplace_back();
