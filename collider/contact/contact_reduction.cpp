@@ -43,6 +43,8 @@ ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const ContactPa
                      [](const Contact& a, const Contact& b) { return a.remaining() < b.remaining(); });
     if (!isStill(contacts, last)) last = {};
     ReducedContacts result;
+    const bool approaches =
+        std::any_of(contacts.begin(), contacts.end(), [](const Contact& contact) { return contact.approach > 0; });
     const LastContacts lastContacts(last);
     float minExtent = std::numeric_limits<float>::max();
     for (const ContactGroup& group : groupByNormal(contacts, lastContacts)) {
@@ -53,7 +55,7 @@ ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const ContactPa
             kept = std::move(first.kept);
             result.reductionError = std::max(result.reductionError, first.reductionError);
             minExtent = std::min(minExtent, extentOf(contacts, group));
-            result.slack = slackTolerances * reductionTolerance * minExtent;
+            result.slack = approaches ? 0 : slackTolerances * reductionTolerance * minExtent;
         }
         for (std::size_t k = 0; k < kept.size(); ++k) {
             if (k % patchSize == 0) result.patches.emplace_back();

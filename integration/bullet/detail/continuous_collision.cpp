@@ -29,13 +29,10 @@ constexpr int maxRounds = 256;
 // A body stopped this early in a step counts as not moved.
 constexpr float atStart = 1e-3f;
 
-/// Two objects; one was stopped where it met the other.
-using StoppedPair = std::pair<const btCollisionObject*, const btCollisionObject*>;
-
 /// Two bodies that may meet in a step; one of them is fast.
 struct SweptPair {
     BodySweep *a, *b;
-    float margin;     ///< two bodies that are not stopped may approach by up to this; contacts handle that [m]
+    float margin;     ///< two bodies that are not stopped may move by up to this; contacts handle that [m]
     Impact impact{};  ///< the first impact; normal from b to a
     float checkedA = -1, checkedB = -1;  ///< the ends of their sweeps when they were last checked
     Impact stop{};                       ///< where one of them was stopped
@@ -69,7 +66,10 @@ struct SweptPair {
 
     bool isStopped() const { return stop.time < 1; }
     bool hasNotMoved() const { return stop.time <= atStart; }
-    StoppedPair objects() const { return std::minmax(&a->object(), &b->object()); }
+    StoppedPair stopped() const {
+        const auto [first, second] = std::minmax(&a->object(), &b->object());
+        return {first, second, !hasNotMoved()};
+    }
 
     /// Sets the velocity of bodies that do not move to zero.
     void removeVelocity() const {
@@ -109,15 +109,15 @@ std::optional<float> marginOf(const btCollisionObject& object) {
 /// The pairs in which a fast body may have tunnelled in a step.
 class SweptPairs {
   public:
-    SweptPairs(btDynamicsWorld& world, float seconds) : world_(world), seconds_(seconds) {
+    SweptPairs(btDynamicsWorld& world, float seconds, const RecentlyFastBodies& fastBefore)
+        : world_(world), seconds_(seconds), fastBefore_(fastBefore) {
         const btCollisionObjectArray& objects = world.getCollisionObjectArray();
-        float minMargin = std::numeric_limits<float>::infinity();
         for (int i = 0; i < objects.size(); ++i)
-            if (const auto margin = marginOf(*objects[i])) minMargin = std::min(minMargin, *margin);
+            if (const auto margin = marginOf(*objects[i])) minMargin_ = std::min(minMargin_, *margin);
         for (int i = 0; i < objects.size(); ++i) {
             if (!activeDynamicBody(*objects[i])) continue;
             const BodySweep sweep(*objects[i], seconds);
-            if (sweep.maxDisplacement() > minMargin) fast_.push_back(sweep);
+            if (sweep.maxDisplacement() > minMargin_ || fastBefore_.contain(*objects[i])) fast_.push_back(sweep);
         }
         for (std::size_t i = 0; i < fast_.size(); ++i) find(i);
     }
@@ -141,8 +141,8 @@ class SweptPairs {
     }
 
     /// Moves the bodies to the poses where they are stopped. Two bodies that stop each other in two successive steps,
-    /// or that have not moved, lose the approach velocity that this step's contacts have left. If both is true, they
-    /// lose all of their velocity, which would otherwise grow with each step.
+    /// or that have not moved, lose the approach velocity that this step's contacts have left. If they have not moved
+    /// in two successive steps, they lose all of their velocity, which would otherwise grow with each step.
     /// @param before  the pairs of the last step; replaced by those of this one
     int apply(std::vector<StoppedPair>& before) const {
         int stopped = 0;
@@ -151,13 +151,24 @@ class SweptPairs {
         std::vector<StoppedPair> stoppedPairs;
         for (const SweptPair& pair : pairs_) {
             if (!pair.isStopped()) continue;
-            stoppedPairs.push_back(pair.objects());
-            const bool isAgain = std::find(before.begin(), before.end(), pair.objects()) != before.end();
-            if (isAgain || pair.hasNotMoved()) pair.removeApproachVelocity();
-            if (isAgain && pair.hasNotMoved()) pair.removeVelocity();
+            const StoppedPair& now = stoppedPairs.emplace_back(pair.stopped());
+            const auto last = std::find_if(before.begin(), before.end(),
+                                           [&](const StoppedPair& one) { return one.isOfSameObjects(now); });
+            const bool isAgain = last != before.end();
+            if (isAgain || !now.hasMoved) pair.removeApproachVelocity();
+            if (isAgain && !last->hasMoved && !now.hasMoved) pair.removeVelocity();
         }
         before = std::move(stoppedPairs);
         return stopped;
+    }
+
+    /// The bodies that this step moves by more than a margin, sorted by address.
+    std::vector<const btCollisionObject*> fastBodies() const {
+        std::vector<const btCollisionObject*> bodies;
+        for (const BodySweep& sweep : fast_)
+            if (sweep.maxDisplacement() > minMargin_) bodies.push_back(&sweep.object());
+        std::sort(bodies.begin(), bodies.end());
+        return bodies;
     }
 
   private:
@@ -204,12 +215,15 @@ class SweptPairs {
     void add(BodySweep& a, BodySweep& b) {
         // no field compares less than any margin
         const auto margin = std::max(marginOf(a.object()), marginOf(b.object()));
-        if (margin) pairs_.push_back({&a, &b, *margin});
+        const bool wasFast = fastBefore_.contain(a.object()) || fastBefore_.contain(b.object());
+        if (margin) pairs_.push_back({&a, &b, wasFast ? 0 : *margin});
     }
 
     btDynamicsWorld& world_;
     float seconds_;
-    std::vector<BodySweep> fast_;  ///< in the world's order
+    const RecentlyFastBodies& fastBefore_;
+    float minMargin_ = std::numeric_limits<float>::infinity();  ///< of all fields
+    std::vector<BodySweep> fast_;                               ///< in the world's order
     /// bodies that these may meet, including static ones
     std::unordered_map<const btCollisionObject*, BodySweep> slow_;
     std::vector<SweptPair> pairs_;
@@ -219,6 +233,16 @@ std::mutex mutex;  // guards what follows
 std::multiset<const btDispatcher*> served;
 
 }  // namespace
+
+bool RecentlyFastBodies::contain(const btCollisionObject& object) const {
+    return std::any_of(steps_.begin(), steps_.end(), [&](const Objects& objects) {
+        return std::binary_search(objects.begin(), objects.end(), &object);
+    });
+}
+
+void RecentlyFastBodies::addStep(Objects fast) {
+    steps_ = {std::move(fast), std::move(steps_[0])};
+}
 
 ContinuousCollision::ContinuousCollision(btDynamicsWorld& world) : world_(world), dispatcher_(world.getDispatcher()) {
     const std::lock_guard lock(mutex);
@@ -236,9 +260,10 @@ bool ContinuousCollision::serves(const btDispatcher& dispatcher) {
 }
 
 void ContinuousCollision::afterStep(float seconds) {
-    SweptPairs pairs(world_, seconds);
+    SweptPairs pairs(world_, seconds, fastBodies_);
     pairs.resolve();
     stopped_ = pairs.apply(stoppedPairs_);
+    fastBodies_.addStep(pairs.fastBodies());
 }
 
 }  // namespace bilayer::bullet::detail

@@ -3,10 +3,32 @@
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
 
-#include <utility>
+#include <array>
 #include <vector>
 
 namespace bilayer::bullet::detail {
+
+/// The bodies that one of the last two steps moved by more than a margin. The solver leaves a part of the speed that it
+/// takes away in an impact, and begins the next step with the impulses of the impact. So these bodies are checked even
+/// if what is left moves them by less than a margin.
+class RecentlyFastBodies {
+  public:
+    using Objects = std::vector<const btCollisionObject*>;  ///< sorted by address
+
+    bool contain(const btCollisionObject& object) const;
+    void addStep(Objects fast);
+
+  private:
+    std::array<Objects, 2> steps_;  ///< the last one first
+};
+
+/// Two objects; one was stopped where it met the other.
+struct StoppedPair {
+    const btCollisionObject *first, *second;
+    bool hasMoved;  ///< before it was stopped
+
+    bool isOfSameObjects(const StoppedPair& other) const { return first == other.first && second == other.second; }
+};
 
 /// Stops bodies on their paths: ExtensionOptions::continuousCollision.
 class ContinuousCollision {
@@ -27,7 +49,8 @@ class ContinuousCollision {
   private:
     btDynamicsWorld& world_;
     const btDispatcher* const dispatcher_;
-    std::vector<std::pair<const btCollisionObject*, const btCollisionObject*>> stoppedPairs_;  ///< in the last step
+    RecentlyFastBodies fastBodies_;
+    std::vector<StoppedPair> stoppedPairs_;  ///< in the last step
     int stopped_ = 0;
 };
 

@@ -31,6 +31,10 @@ namespace {
 constexpr float testDepth = 0.25f;
 // Maximum depth of such a point below the plane at its entry, or beyond its initial depth [voxels].
 constexpr float allowedDepth = 0.1f;
+// A stopped body goes back by this much at most from where the test point entered [voxels]. An oblique path touches far
+// before it enters. Where the surface bends in between, the next step's contacts would not see what the body met, and
+// stop it in the same place again.
+constexpr float maxReturn = 0.5f;
 // Arcs are approximated by chords of this angle [rad]; their error is its square over eight, in fractions of the
 // radius.
 constexpr float maxChordAngle = 0.1f;
@@ -134,7 +138,8 @@ class PointSweep {
                     // back to the contact of its own surface
                     const glm::vec3 out = transforms_[i].linear * outward / scale_;
                     const float touching = std::min(inward * glm::dot(out, entered->normal), 0.f);
-                    const float part = (touching - before) / (after - before);
+                    const float descent = after - before, back = maxReturn * voxel_ / glm::distance(from, to);
+                    const float part = std::max(touching - before, -before - back * descent) / descent;
                     const float time = transforms_[i].time + part * (transforms_[i + 1].time - transforms_[i].time);
                     first_ = {std::clamp(time, 0.f, first_.time), entered->position - offset, entered->normal};
                     return;
