@@ -15,6 +15,7 @@ FieldData::FieldData(const LevelSet& levelSet, Storage storage)
       kernels(sampleKernels(storage)),
       coarse(clearance()),
       signedByNormals(levelSet.sign() == "normals"),
+      signedByWinding(signedByNormals || levelSet.sign() == "winding"),
       sampleError(levelSet.errorBound() + (storage == Storage::fixed16 ? step : 0)) {
     fillLanes();
 }

@@ -69,14 +69,18 @@ class Field {
     /// - The result is exact to 1e-5 voxels up to ten voxels away, and to a millionth of the distance beyond.
     /// - The sign is the field's wherever that is certain: farther than a voxel's diagonal from the surface, and mostly
     ///   nearer. inside() and the sign of sample() agree with it there.
-    /// - Elsewhere the sign comes from the normal at the closest feature. It comes from the sample instead where
-    ///   normals cancel out. The same holds if the field is not signed by normals and does not confirm that the wall
-    ///   separates inside from outside.
+    /// - Elsewhere, in a closed mesh signed by normals or winding numbers, it is that of the mesh's winding number.
+    /// Only
+    ///   the normal at the closest feature decides within a tenth of a voxel of a surface signed by normals, and where
+    ///   the sample agrees with it. Both err only where the surface meets itself within a voxel.
+    /// - Elsewhere, in other meshes, the normal decides if the field confirms that the wall separates inside from
+    ///   outside; otherwise the sample.
     /// - Any one of the features that are equally close within the tolerance is returned. At an edge or vertex itself,
     ///   to 1e-5 voxels or the rounding of the point, it is that edge or vertex.
     ///
-    /// Without the mesh, the result is the closest zero of the interpolant to 1e-3 voxels, a hundred times slower. In a
-    /// band narrower than sqrt(3) voxels some zeros may be missed.
+    /// Without the mesh, the result is the closest zero of the interpolant to 1e-3 voxels, a hundred times slower. It
+    /// takes far longer where the whole surface is equally near, as at the centre of a sphere: seconds for 128 voxels
+    /// across. In a band narrower than sqrt(3) voxels some zeros may be missed.
     ///
     /// Finds nothing for a non-finite point, nor for a negative or NaN maxDistance.
     /// @param maxDistance  search radius [m]

@@ -10,6 +10,7 @@
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/leaf/build_options.h"
 
 namespace bilayer {
 
@@ -23,6 +24,8 @@ constexpr double smallestVoxel = 1e-15, largestVoxel = 1e15;
 constexpr double farthestOrigin = double(std::uint64_t(1) << 40);
 /// Maximum band width [voxels]: a wider band is treated as file damage.
 constexpr float widestBand = 1 << 23;
+/// Tolerance of an error bound, which was rounded when it was multiplied by the voxel size.
+constexpr float rounding = 1e-5f;
 /// The empty name is for fields from other programs.
 constexpr std::string_view methods[] = {"", nameOf(Method::exact), nameOf(Method::doubleLayer),
                                         nameOf(Method::pseudonormal), nameOf(Method::prism)};
@@ -59,6 +62,25 @@ std::string requireName(const openvdb::GridBase& grid, const char* entry, const 
     return name;
 }
 
+// A field from another program may state any error, or none.
+void requireErrorBound(const openvdb::GridBase& grid, const std::string& method, float errorBound) {
+    if (!grid[metadata::errorBound]) return;
+    const bool hasBound = method == nameOf(Method::exact) || method == nameOf(Method::pseudonormal);
+    const float least = hasBound ? (1 - rounding) * detail::errorBound({}) : 0, h = float(grid.voxelSize()[0]);
+    require(errorBound >= least * h && (std::isfinite(errorBound) || !hasBound), grid, metadata::errorBound, errorBound,
+            hasBound ? "finite and at least 1e-4 voxels by this method" : "0 or above");
+}
+
+// Methods with signs of their own have no others.
+void requireSignOfMethod(const openvdb::GridBase& grid, const std::string& method, const std::string& sign) {
+    const auto agree = [&](const char* itsMethod, const char* itsSigns) {
+        return method.empty() || sign.empty() || (method == itsMethod) == (sign == itsSigns);
+    };
+    if (!agree(nameOf(Method::doubleLayer), layerSigns) || !agree(nameOf(Method::prism), prismSigns))
+        throw std::invalid_argument(fmt::format("grid '{}': '{}' is {}, which the method {} does not have",
+                                                grid.getName(), metadata::sign, sign, method));
+}
+
 void requireLevelSet(const Grids& grids) {
     if (!grids.distance) throw std::invalid_argument("the field has no distance grid");
     const openvdb::FloatGrid& grid = *grids.distance;
@@ -92,10 +114,12 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     exteriorWidth_ = grid.background();
     interiorWidth_ = meta<float>(grid, metadata::interiorWidth, exteriorWidth_);
     requireWidth(grid, metadata::interiorWidth, interiorWidth_);
-    errorBound_ = meta<float>(grid, metadata::errorBound, std::numeric_limits<float>::quiet_NaN());
-    require(!(errorBound_ < 0), grid, metadata::errorBound, errorBound_, "0 or above");
+    meta<std::string>(grid, metadata::version, "");
     method_ = requireName(grid, metadata::method, methods);
+    errorBound_ = meta<float>(grid, metadata::errorBound, std::numeric_limits<float>::quiet_NaN());
+    requireErrorBound(grid, method_, errorBound_);
     sign_ = requireName(grid, metadata::sign, signs);
+    requireSignOfMethod(grid, method_, sign_);
     signReason_ = meta<std::string>(grid, metadata::signReason, "");
     for (const char* count : {metadata::signConflicts, metadata::signUndecided}) {
         const auto value = meta<std::int64_t>(grid, count, 0);

@@ -33,8 +33,8 @@ class LevelSet {
     /// - a transform other than a uniform scale and a shift by whole voxels;
     /// - voxels below 1e-15 m or above 1e15 m;
     /// - a width that is not positive or exceeds 2^23 voxels;
-    /// - a negative error bound or count;
-    /// - an unknown method or sign method.
+    /// - an error bound that is negative, no number, or below that of its method; a negative count;
+    /// - an unknown method or sign method, or signs that the method does not have.
     explicit LevelSet(std::shared_ptr<const Grids> grids);
 
     float voxelSize() const;             ///< [m]

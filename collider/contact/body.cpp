@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "collider/contact/stored_points.h"
 #include "collider/field/field_data.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/sign/sign_choice.h"
 
 namespace bilayer::detail {
 namespace {
@@ -55,8 +57,18 @@ class Entries {
 
     template <class Value>
     std::optional<Value> find(const char* name) const {
-        const auto entry = grid_.getMetadata<openvdb::TypedMetadata<Value>>(name);
-        return entry ? std::optional(entry->value()) : std::nullopt;
+        const auto entry = grid_[name];
+        if (!entry) return std::nullopt;
+        const auto typed = openvdb::DynamicPtrCast<const openvdb::TypedMetadata<Value>>(entry);
+        if (!typed)
+            refuseBody(
+                fmt::format("'{}' is of type {}, not {}", name, entry->typeName(), openvdb::typeNameAsString<Value>()));
+        return typed->value();
+    }
+
+    // Throws if an entry is there without the one that it belongs to.
+    void requireAbsent(const char* name, const char* without) const {
+        if (grid_[name]) refuseBody(fmt::format("'{}' is missing, but '{}' is there", without, name));
     }
 
     template <class Value>
@@ -88,7 +100,11 @@ void storeMass(openvdb::FloatGrid& grid, const MassProperties& mass) {
 }
 
 std::optional<MassProperties> loadMass(const Entries& entries) {
-    if (!entries.find<double>(entry::volume)) return std::nullopt;
+    if (!entries.find<double>(entry::volume)) {
+        for (const char* other : {entry::centre, entry::inertia, entry::products, entry::principal, entry::axes})
+            entries.requireAbsent(other, entry::volume);
+        return std::nullopt;
+    }
     MassProperties mass;
     mass.volume = entries.get<double>(entry::volume);
     mass.centre = entries.vector(entry::centre);
@@ -103,7 +119,7 @@ std::optional<MassProperties> loadMass(const Entries& entries) {
 
 // Checks the mass properties of a solid within a box. From a field, the solid may be a voxel wider than its mesh.
 void check(const MassProperties& mass, const Bounds& bounds, float tolerance) {
-    const auto require = [](bool holds, const char* name, const auto& value, const char* range) {
+    const auto require = [](bool holds, const char* name, const auto& value, const std::string& range) {
         if (!holds) refuseBody(fmt::format("'{}' is {}, and must be {}", name, value, range));
     };
     const Bounds box{bounds.lower - tolerance, bounds.upper + tolerance};
@@ -114,8 +130,11 @@ void check(const MassProperties& mass, const Bounds& bounds, float tolerance) {
     require(centre == glm::clamp(centre, box.lower, box.upper), entry::centre, text(centre), "within the bounds");
     require(p.x > 0 && p.x <= p.y && p.y <= p.z && p.z <= (1 + massError) * (p.x + p.y), entry::principal, text(p),
             "positive, ascending, and the last no more than the sum of the others");
-    require(double(p.z) <= mass.volume * glm::dot(size, size), entry::principal, text(p),
-            "no more than the bounds allow");
+    // of all solids of a volume, a ball has the smallest moments
+    const double ball = 1.2 * mass.volume * std::pow(0.75 / glm::pi<double>() * mass.volume, 2. / 3);
+    require(double(p.x) + double(p.y) + double(p.z) >= (1 - double(massError)) * ball &&
+                double(p.z) <= mass.volume * glm::dot(size, size),
+            entry::principal, text(p), fmt::format("what the bounds and '{}' allow", entry::volume));
     require(isUnit(glm::length(mass.principalAxes)), entry::axes, "no rotation", "of unit length");
     const glm::mat3 axes = glm::mat3_cast(mass.principalAxes);
     const glm::mat3 rotated =
@@ -123,14 +142,14 @@ void check(const MassProperties& mass, const Bounds& bounds, float tolerance) {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
             require(std::abs(rotated[i][j]) <= massError, i == j ? entry::inertia : entry::products, mass.inertia[i][j],
-                    "what the principal moments make it");
+                    fmt::format("what '{}' and '{}' make it", entry::principal, entry::axes));
 }
 
 void requireWithin(const SurfacePoints& points, const Bounds& bounds) {
     const glm::vec3 tolerance(boundsError * glm::length(glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper))));
     for (const SurfacePoint& point : points.points())
         if (point.position != glm::clamp(point.position, bounds.lower - tolerance, bounds.upper + tolerance))
-            refuseBody("a surface point lies outside of its bounds");
+            refuseBody(fmt::format("a surface point lies outside of '{}' and '{}'", entry::lower, entry::upper));
 }
 
 std::shared_ptr<const Mesh> meshOf(const LevelSet& levelSet) {
@@ -141,8 +160,18 @@ std::shared_ptr<const Mesh> meshOf(const LevelSet& levelSet) {
     return mesh;
 }
 
+// A mesh that build() neither reoriented nor repaired is stored as it was given.
+void requireMeshOf(const LevelSet& levelSet, const Mesh& mesh) {
+    const bool asGiven = levelSet.sign() == "normals" && levelSet.signReason() == closedAndOriented;
+    if (!asGiven || levelSet.meshHash() == 0) return;
+    if (const std::uint64_t its = hash(mesh); its != levelSet.meshHash())
+        refuseBody(fmt::format("'{}' is {:x}, but the hash of its mesh is {:x}", metadata::meshHash,
+                               levelSet.meshHash(), its));
+}
+
 void requireSame(const Bounds& ofMesh, const Bounds& ofBody) {
-    if (ofMesh.lower != ofBody.lower || ofMesh.upper != ofBody.upper) refuseBody("its mesh is of another body");
+    if (ofMesh.lower != ofBody.lower || ofMesh.upper != ofBody.upper)
+        refuseBody(fmt::format("'{}' and '{}' are not those of its mesh", entry::lower, entry::upper));
 }
 
 constexpr std::pair<ContactAccuracy, const char*> accuracyNames[] = {{ContactAccuracy::samples, "samples"},
@@ -152,7 +181,7 @@ constexpr std::pair<ContactAccuracy, const char*> accuracyNames[] = {{ContactAcc
 ContactAccuracy accuracyOf(const std::string& name) {
     for (const auto& [accuracy, itsName] : accuracyNames)
         if (name == itsName) return accuracy;
-    refuseBody(fmt::format("'{}' is {}", entry::measure, name));
+    refuseBody(fmt::format("'{}' is '{}', and must be samples, edges or triangles", entry::measure, name));
 }
 
 // Detects a field that was moved or scaled by another program, without its body.
@@ -163,10 +192,12 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
     const double band = double(grid.background()) + maxFieldBeyondBand * grid.voxelSize()[0];
     for (int axis = 0; axis < 3; ++axis) {
         const double low = double(bounds.lower[axis]) - lower[axis], high = upper[axis] - double(bounds.upper[axis]);
-        if (!(low >= 0 && high >= 0))
-            throw std::invalid_argument("the body is of another field: its surface lies outside of the voxels");
-        if (!(low <= band && high <= band))
-            throw std::invalid_argument("the body is of another field: voxels of the band lie far from its surface");
+        const auto refuse = [](const char* why) {
+            throw std::invalid_argument(
+                fmt::format("the body is of another field: by '{}' and '{}', {}", entry::lower, entry::upper, why));
+        };
+        if (!(low >= 0 && high >= 0)) refuse("its surface lies outside of the voxels");
+        if (!(low <= band && high <= band)) refuse("voxels of the band lie far from its surface");
     }
 }
 
@@ -175,10 +206,10 @@ void check(const Body& body, const openvdb::FloatGrid& grid) {
     const auto voxel = float(grid.voxelSize()[0]);
     if (!(body.margin >= 0 && body.margin <= maxMargin * voxel))
         refuseBody(fmt::format("'{}' is {}, and must be 0 to {} voxels", entry::margin, body.margin, maxMargin));
-    if (body.mass) check(*body.mass, body.bounds, voxel);
     requireWithin(body.points, body.bounds);
     requireWithin(body.bounds, grid);
     if (body.mesh) requireSame(bounds(*body.mesh), body.bounds);
+    if (body.mass) check(*body.mass, body.bounds, voxel);
 }
 
 }  // namespace
@@ -188,6 +219,7 @@ LevelSet withBody(const LevelSet& given, const Body& body) {
     if (body.mesh) validate(*body.mesh);
     const LevelSet& levelSet = body.filled ? *body.filled : given;
     check(body, *levelSet.grids().distance);
+    if (body.mesh) requireMeshOf(levelSet, *body.mesh);
     openvdb::initialize();
     const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
     for (const char* stale : {entry::volume, entry::centre, entry::inertia, entry::products, entry::principal,
@@ -214,7 +246,8 @@ Body bodyOf(const LevelSet& levelSet) {
     if (!kind)
         throw std::invalid_argument("the field has no body stored with it (withBody(), or bilayer build --body)");
     if (*kind != format)
-        throw std::invalid_argument(fmt::format("the body is of kind {}, which only another version knows", *kind));
+        throw std::invalid_argument(
+            fmt::format("the body is of kind {} ('{}'), which only another version knows", *kind, entry::format));
     Body body;
     body.margin = entries.get<float>(entry::margin);
     body.bounds.lower = entries.vector(entry::lower);
@@ -222,7 +255,12 @@ Body bodyOf(const LevelSet& levelSet) {
     body.mass = loadMass(entries);
     body.points = loadPoints(levelSet);
     body.mesh = meshOf(levelSet);
-    if (body.mesh) body.accuracy = accuracyOf(entries.get<std::string>(entry::measure));
+    if (body.mesh) {
+        body.accuracy = accuracyOf(entries.get<std::string>(entry::measure));
+        requireMeshOf(levelSet, *body.mesh);
+    } else {
+        entries.requireAbsent(entry::measure, meshEntry);
+    }
     check(body, *levelSet.grids().distance);
     return body;
 }

@@ -14,8 +14,10 @@
 #include <bilayer/collider/field.h>
 #include "collider/field/batch.h"
 #include "collider/field/field_data.h"
+#include "collider/field/mesh_winding.h"
 #include "collider/field/path.h"
 #include "collider/field/zero_set.h"
+#include "sdf/sign/sign_choice.h"
 
 namespace bilayer {
 
@@ -33,6 +35,9 @@ constexpr std::size_t batch = 64;
 constexpr float probeOffset = 1;
 /// Max error of samples at an edge [voxels].
 constexpr float edgeError = 0.3f;
+/// Max error of samples where the surface is smooth, that is, where its radius of curvature is at least 2.5 voxels
+/// [voxels].
+constexpr float smoothError = 0.1f;
 
 // The height of a point over the plane of the normal, which may be shorter than 1.
 double heightOver(const NearestFeature& nearest) {
@@ -58,6 +63,7 @@ FieldData::FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outwa
       coarse(clearance()),
       mesh(std::make_unique<MeshTree>(std::move(outward), voxelSize)),
       signedByNormals(samples.signedByNormals),
+      signedByWinding(samples.signedByWinding && balanced(mesh->mesh())),
       sampleError(samples.sampleError),
       error(sampleError) {
     fillLanes();
@@ -91,15 +97,13 @@ void FieldData::fetchSide(const glm::dvec3& local) const {
 // A sphere around a voxel that does not reach the surface is on the voxel's side.
 FieldData::Side FieldData::sideAt(const glm::dvec3& local) const {
     const std::ptrdiff_t index = nearestVoxel(local);
-    if (index < 0) {
-        const float bound = sample(local).distance;
-        const bool certain = std::abs(bound) > error;
-        return {bound < 0, certain};
+    if (index >= 0) {
+        const float value = valueAt(std::size_t(index));
+        const double away = glm::distance(local, glm::floor(local + 0.5)) * voxel;
+        if (away < double(std::abs(value) - error)) return {value < 0, true, value};
     }
-    const float value = valueAt(std::size_t(index));
-    const double away = glm::distance(local, glm::floor(local + 0.5)) * voxel;
-    const bool certain = away < double(std::abs(value) - error);
-    return {(certain ? value : sample(local).distance) < 0, certain};
+    const float distance = sample(local).distance;
+    return {distance < 0, index < 0 && std::abs(distance) > error, distance};
 }
 
 // Whether the field changes sign at a place of the mesh. It does not at walls within the solid, nor at free-standing
@@ -112,13 +116,33 @@ bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const
            outer - inner > probeOffset * voxelSize / 2;
 }
 
-// The field decides where it is certain, so that all queries agree. Otherwise the normal decides if it defines a side:
-// for meshes signed by normals, and for walls that the field confirms. Otherwise the field's sample decides, which
-// blends the surfaces on both sides of an edge.
+// Whether a normal defines the side of a point, and the sample does not contradict it: it has the same sign, or both
+// put the point so close to the surface that the interpolation error explains the difference.
+bool FieldData::confirms(const NearestFeature& nearest, const Side& side) const {
+    const double height = heightOver(nearest), distance = glm::length(nearest.offset);
+    const bool hasSide = std::abs(height) > minMeanNormal * distance;
+    const double close = double(smoothError) * voxel;
+    return hasSide && ((height < 0) == side.inside || (distance < close && double(std::abs(side.distance)) < close));
+}
+
+// The field decides where it is certain, so that all queries agree. Otherwise the normal decides for meshes signed by
+// normals, if the sample confirms it. Otherwise the winding number of a closed mesh decides.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
     const Side side = sideAt(toLocal(point));
     if (side.certain) return side.inside;
     if (!mesh->mayEnclose(glm::dvec3(point))) return false;
+    if (signedByNormals && confirms(nearest, side)) return heightOver(nearest) < 0;
+    if (signedByWinding && !nearest.isOnSurface) {
+        const auto winding = windingNumber(*mesh, point);
+        if (winding && *winding >= 0) return *winding > 0;
+    }
+    return isBehind(nearest, side, point);
+}
+
+// The side of a point without winding numbers. The normal decides if it defines a side: for meshes signed by normals,
+// and for walls that the field confirms. Otherwise the sample decides, which blends the surfaces on both sides of an
+// edge.
+bool FieldData::isBehind(const NearestFeature& nearest, const Side& side, const glm::vec3& point) const {
     const double height = heightOver(nearest);
     const bool hasSide = std::abs(height) > minMeanNormal * glm::length(nearest.offset);
     if (!hasSide) return side.inside;

@@ -56,8 +56,9 @@ struct FieldData : FieldLayout {
     std::unique_ptr<const MeshTree> mesh;  ///< null: the field has no mesh
     BlockEntries entries;                  ///< for closest-point searches in the band
     bool signedByNormals;                  ///< the signs come from the mesh's normals
-    float sampleError;  ///< max error of distances in the band relative to the mesh [m]; infinite: unknown
-    float error = 0;    ///< the same relative to the geometry that queries use: the mesh if there is one [m]
+    bool signedByWinding;  ///< the signs are those of winding numbers, which the mesh has everywhere: it is closed
+    float sampleError;     ///< max error of distances in the band relative to the mesh [m]; infinite: unknown
+    float error = 0;       ///< the same relative to the geometry that queries use: the mesh if there is one [m]
 
     /// Fraction bits of a fixed-point place. The remaining bits of the 32-bit word hold the voxel within its block.
     static constexpr int fractionBits = 29;
@@ -100,11 +101,14 @@ struct FieldData : FieldLayout {
     /// The field's answer to the side of a point.
     struct Side {
         bool inside, certain;
+        float distance;  ///< of the nearest voxel if that is certain, else of the sample [m]
     };
     std::ptrdiff_t nearestVoxel(const glm::dvec3& local) const;
     void fetchSide(const glm::dvec3& local) const;
     Side sideAt(const glm::dvec3& local) const;
     bool divides(const glm::dvec3& place, const glm::dvec3& normal) const;
+    bool confirms(const NearestFeature& nearest, const Side& side) const;
+    bool isBehind(const NearestFeature& nearest, const Side& side, const glm::vec3& point) const;
     bool isInside(const NearestFeature& nearest, const glm::vec3& point) const;
     float boundOf(float maxDistance) const;
     std::uint32_t orBeyond(std::uint32_t part, const EntryPlace& place, const glm::vec3& point,

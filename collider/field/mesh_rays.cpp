@@ -6,14 +6,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include <algorithm>
-#include <bit>
-#include <cmath>
-#include <limits>
-
-#include "collider/field/tree_place.h"
+#include "collider/field/ray_traversal.h"
 #include "collider/field/triangle_tests.h"
-#include "sdf/bvh/node_stack.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
@@ -21,126 +15,18 @@ namespace bilayer::detail::HWY_NAMESPACE {
 namespace {
 /// Max distance at which a ray may pass a triangle and still hit it [voxels].
 constexpr double rayTolerance = 1e-5;
-/// Min speed along an axis; below it the ray moves less than a voxel over the longest path.
-constexpr float slowest = 1e-9f;
-/// Tolerance for the rounding of a quotient.
-constexpr float quotientRoundUp = 1 + 1e-6f;
-
-// The search for the first hit of a ray.
-class RaySearch {
-  public:
-    RaySearch(const MeshTree& mesh, const Path& path)
-        : mesh_(mesh.mesh()),
-          tree_(mesh.tree()),
-          place_(mesh, path.origin),
-          direction_(path.direction),
-          exact_(path.origin, path.direction, rayTolerance * double(mesh.voxelSize())),
-          perMetre_(1 / double(mesh.voxelSize())),
-          best_(path.length) {
-        for (int k = 0; k < 3; ++k) {
-            const bool down = direction_[k] < 0;
-            perDirection_[k] = (down ? -1 : 1) / std::max(std::abs(direction_[k]), slowest);
-            forward_[k] = !down;
-            nearOrigin_[k] = place_.point[k] + (down ? -place_.slack : place_.slack);
-            farOrigin_[k] = place_.point[k] - (down ? -place_.slack : place_.slack);
-        }
-        limitTo(best_);
-    }
-
-    std::optional<MeshHit> run() {
-        descend(
-            tree_, tree_.root(), [&](float key) { return key > limit_; },
-            [&](std::uint32_t group, NodeStack& stack) { open(tree_.groups[group], stack); },
-            [&](std::uint32_t leaf) { return visit(tree_.leaves[leaf]), false; });
-        if (triangle_ == noTriangle) return std::nullopt;
-        return MeshHit{best_, position_, triangle_};
-    }
-
-  private:
-    void limitTo(double along) {
-        best_ = along;
-        limit_ = std::min(float(along * perMetre_) * quotientRoundUp + place_.slack, std::numeric_limits<float>::max());
-    }
-
-    // Slab test: T. Kay, J. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986, 269-278.
-    void open(const BoxGroup& group, NodeStack& stack) const {
-        const Tag tag;
-        alignas(64) float enters[treeWidth];
-        unsigned met = 0;
-        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
-            Vec enter = hn::Zero(tag), leave = hn::Set(tag, limit_);
-            for (int k = 0; k < 3; ++k) {
-                const float* first = forward_[k] ? group.lower[k] : group.upper[k];
-                const float* second = forward_[k] ? group.upper[k] : group.lower[k];
-                const Vec per = hn::Set(tag, perDirection_[k]);
-                enter = hn::Max(enter, hn::Mul(hn::Sub(hn::Load(tag, first + i), hn::Set(tag, nearOrigin_[k])), per));
-                leave = hn::Min(leave, hn::Mul(hn::Sub(hn::Load(tag, second + i), hn::Set(tag, farOrigin_[k])), per));
-            }
-            hn::Store(enter, tag, enters + i);
-            met |= bitsOf(hn::Le(enter, hn::Mul(leave, hn::Set(tag, quotientRoundUp)))) << i;
-        }
-        stack.pushChildren(met, enters, group.firstChild);
-    }
-
-    // A bit mask of the triangles that the line passes, each in its own frame. All terms are multiplied by the cosine
-    // between line and normal. Distances in the plane thereby become distances from the line, at any angle.
-    unsigned passed(const WideLeaf& leaf, std::size_t i) const {
-        const Tag tag;
-        const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
-        const auto dot = [&](const Vec* a, const Vec* b) {
-            return hn::Add(hn::Add(hn::Mul(a[0], b[0]), hn::Mul(a[1], b[1])), hn::Mul(a[2], b[2]));
-        };
-        const auto det = [&](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, d), hn::Mul(b, c)); };
-        Vec q[3], d[3], n[3], a[3];
-        for (int k = 0; k < 3; ++k) {
-            q[k] = place_.from(leaf, load, k);
-            d[k] = hn::Set(tag, direction_[k]);
-            n[k] = load(leaf.normal[k]);
-            a[k] = load(leaf.along[k]);
-        }
-        const Vec b[3] = {det(n[1], n[2], a[1], a[2]), det(n[2], n[0], a[2], a[0]), det(n[0], n[1], a[0], a[1])};
-        const Vec height = dot(q, n), fall = dot(d, n), steep = hn::Abs(fall);
-        const auto upright = [&](Vec v) { return hn::Xor(v, hn::And(fall, hn::SignBit(tag))); };
-        const Vec x = upright(det(dot(q, a), dot(d, a), height, fall));
-        const Vec y = upright(det(dot(q, b), dot(d, b), height, fall)), along = upright(hn::Neg(height));
-
-        const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
-        const Vec acrossBC = det(bcx, bcy, hn::Sub(x, hn::Mul(load(leaf.lengthAB), steep)), y);
-        const Vec acrossAC = det(x, y, load(leaf.directionAC[0]), load(leaf.directionAC[1]));
-        // the sum of the coordinates is an upper bound of the distance
-        const Vec away = hn::Add(hn::Add(hn::Abs(q[0]), hn::Abs(q[1])), hn::Abs(q[2]));
-        const Vec room = hn::Add(hn::Mul(hn::Set(tag, passRounding), away), hn::Set(tag, passTolerance));
-        const Vec inside = hn::Min(hn::Min(y, along), hn::Min(acrossBC, acrossAC));
-        return bitsOf(hn::And(hn::Ge(hn::Add(inside, room), hn::Zero(tag)),
-                              hn::Le(along, hn::Add(hn::Mul(hn::Set(tag, limit_), steep), room))));
-    }
-
-    void visit(const WideLeaf& leaf) {
-        unsigned bits = 0;
-        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(Tag())) bits |= passed(leaf, i) << i;
-        for (; bits != 0; bits &= bits - 1) {
-            const std::uint32_t triangle = leaf.triangles[std::countr_zero(bits)];
-            if (!exact_.meets(cornersOf(mesh_, triangle), best_, position_)) continue;
-            triangle_ = triangle;
-            limitTo(best_);
-        }
-    }
-
-    const Mesh& mesh_;
-    const WideTree& tree_;
-    TreePlace place_;
-    glm::vec3 direction_;
-    TriangleRay exact_;
-    double perMetre_, best_;
-    float limit_ = 0;
-    float perDirection_[3], nearOrigin_[3], farOrigin_[3];
-    bool forward_[3];
-    glm::dvec3 position_{0};
-    std::uint32_t triangle_ = noTriangle;
-};
 
 std::optional<MeshHit> searchRay(const MeshTree& mesh, const Path& path) {
-    return RaySearch(mesh, path).run();
+    const TriangleRay ray(path.origin, path.direction, rayTolerance * double(mesh.voxelSize()));
+    RayTraversal traversal(mesh, path);
+    MeshHit hit{.along = path.length, .position = {}, .triangle = noTriangle};
+    traversal.run([&](std::uint32_t triangle) {
+        if (!ray.meets(cornersOf(mesh.mesh(), triangle), hit.along, hit.position)) return;
+        hit.triangle = triangle;
+        traversal.limitTo(hit.along);
+    });
+    if (hit.triangle == noTriangle) return std::nullopt;
+    return hit;
 }
 
 }  // namespace

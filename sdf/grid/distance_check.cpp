@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
+#include <string>
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/openvdb.h"
@@ -23,7 +24,9 @@ class DistanceCheck {
   public:
     explicit DistanceCheck(const LevelSet& levelSet)
         : grid_(*levelSet.grids().distance),
-          interior_(grid_[metadata::interiorWidth] ? (1 - halfRounding) * levelSet.interiorWidth() : 0) {}
+          interior_(levelSet.interiorWidth()),
+          isOurs_(grid_[metadata::interiorWidth] || grid_[metadata::version]),
+          isBand_(isOurs_ && grid_[metadata::errorBound]) {}
 
     void run() const {
         checkTiles();
@@ -36,14 +39,22 @@ class DistanceCheck {
     }
 
   private:
-    [[noreturn]] void refuse(const char* why) const {
+    [[noreturn]] void refuse(const std::string& why) const {
         throw std::invalid_argument(fmt::format("grid '{}' {}", grid_.getName(), why));
+    }
+
+    [[noreturn]] void refuseInterior(const char* voxel, float distance, const char* range) const {
+        refuse(fmt::format("has {} voxel {:g} inside, but '{}' is {:g}: it must be {} that", voxel, -distance,
+                           metadata::interiorWidth, interior_, range));
     }
 
     void check(float distance, bool active) const {
         if (!std::isfinite(distance)) refuse("holds a distance that is no finite number");
-        if (!active && distance < 0 && distance > -interior_)
-            refuse("holds a distance outside its band that 'bilayer:interior_width' counts to it");
+        if (!isOurs_ || distance >= 0) return;
+        const bool deeper = -distance > (1 + halfRounding) * interior_;
+        if (!active && (deeper || -distance < (1 - halfRounding) * interior_))
+            refuseInterior("an inactive", distance, "equal to");
+        if (active && isBand_ && deeper) refuseInterior("an active", distance, "at least");
     }
 
     void checkTiles() const {
@@ -63,7 +74,9 @@ class DistanceCheck {
     }
 
     const openvdb::FloatGrid& grid_;
-    float interior_;  // minimum distance of inactive inside voxels from the surface [m]
+    float interior_;  // the width of the band inside [m]
+    bool isOurs_;     // inactive voxels inside hold the width; without an entry, it is that outside
+    bool isBand_;     // as build() made it, unlike an extended field: active voxels are within the band
 };
 
 }  // namespace

@@ -9,7 +9,7 @@ namespace bilayer::detail {
 /// Throws std::invalid_argument in these cases:
 /// - a distance is not finite, which rounding, searches and solvers would propagate;
 /// - a tile is active, which solvers would fill with voxels;
-/// - the stored interior width does not match the distances;
+/// - the stored interior width is not that of inactive voxels inside, or less than that of an active one;
 /// - a voxel is too far from the origin of the grid.
 void requireValidDistances(const LevelSet& levelSet);
 

@@ -4,47 +4,18 @@
 #include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <span>
 #include <utility>
 #include <vector>
 
-#include "sdf/base/exact_sum.h"
+#include "sdf/base/plane_side.h"
 #include "sdf/bvh/close_pairs.h"
 
 namespace bilayer::detail {
 namespace {
-
-/// Rounding error of a volume in double precision, relative to the sum of the absolute values of its products: a
-/// generous bound (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997, gives 7.8e-16 for exact
-/// differences).
-constexpr double roundingOfVolume = 2e-15;
-
-// Returns the sign of the volume of four points, for any floats: that of 24 products of three factors, each expanded
-// exactly into a sum of doubles.
-int exactSide(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
-    ExactSum<64> sum;
-    const auto add = [&](const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& r, double sign) {
-        for (int i = 0; i < 3; ++i) {
-            const int k = (i + 1) % 3, l = (i + 2) % 3;
-            for (const double two : {sign * q[k] * r[l], -sign * q[l] * r[k]}) {
-                const double product = p[i] * two;
-                sum.add(std::fma(p[i], two, -product));
-                sum.add(product);
-            }
-        }
-    };
-    add(b, c, d, 1);
-    add(a, c, d, -1);
-    add(a, b, d, 1);
-    add(a, b, c, -1);
-    return sum.sign();
-}
 
 // The intersection of a triangle with the plane of another: none (at most a point, or the whole triangle), one of its
 // edges, or a segment with the triangle on both sides.
@@ -125,13 +96,7 @@ class Pairs {
     // Returns the sign of the volume of four vertices; 0 if a vertex occurs twice.
     int side(unsigned a, unsigned b, unsigned c, unsigned d) const {
         if (a == c || b == c || d == a || d == b || d == c) return 0;
-        const glm::dvec3 origin = mesh_.points[a], u = glm::dvec3(mesh_.points[b]) - origin,
-                         v = glm::dvec3(mesh_.points[c]) - origin, w = glm::dvec3(mesh_.points[d]) - origin;
-        const double volume = glm::dot(glm::cross(u, v), w);
-        const glm::dvec3 products(std::abs(u.y * v.z) + std::abs(u.z * v.y), std::abs(u.z * v.x) + std::abs(u.x * v.z),
-                                  std::abs(u.x * v.y) + std::abs(u.y * v.x));
-        if (std::abs(volume) > roundingOfVolume * glm::dot(products, glm::abs(w))) return volume > 0 ? 1 : -1;
-        return exactSide(mesh_.points[a], mesh_.points[b], mesh_.points[c], mesh_.points[d]);
+        return planeSide(mesh_.points[a], mesh_.points[b], mesh_.points[c], mesh_.points[d]);
     }
 
     const Mesh& mesh_;

@@ -53,23 +53,20 @@ class Search {
           winding_(mesh, progress),
           slope_(mesh, progress) {}
 
+    // Cubes are taken in descending order of the distances that they may hold. The first small one is thus the same for
+    // any minimum width that it reaches.
     Hole run() const {
         std::priority_queue<Cube> cubes;
         cubes.push(whole());
         while (!cubes.empty()) {
+            if (const Cube& widest = cubes.top(); isSmall(widest)) return {2 * widest.maxDistance(), widest.centre};
             std::vector<Cube> batch;
-            for (; batch.size() < batchSize && !cubes.empty(); cubes.pop()) batch.push_back(cubes.top());
+            for (; batch.size() < batchSize && !cubes.empty() && !isSmall(cubes.top()); cubes.pop())
+                batch.push_back(cubes.top());
             std::vector<std::vector<Cube>> parts(batch.size());
             tbb::parallel_for(std::size_t(0), batch.size(), [&](std::size_t i) { parts[i] = divided(batch[i]); });
-            Cube widest{};
             for (const std::vector<Cube>& some : parts)
-                for (const Cube& cube : some) {
-                    if (!isSmall(cube))
-                        cubes.push(cube);
-                    else if (cube.distance > widest.distance)
-                        widest = cube;
-                }
-            if (widest.distance > 0) return {2 * widest.distance, widest.centre};
+                for (const Cube& cube : some) cubes.push(cube);
         }
         return {};
     }

@@ -12,11 +12,11 @@ class Progress;
 /// The widest hole of a mesh. A hole is closed by the surface on which the winding number is one half. Its width is the
 /// diameter of the largest ball around a point of that surface that contains no triangle.
 struct Hole {
-    double width = 0;      ///< [m], accurate to 10 %; 0: no hole
+    double width = 0;      ///< [m], up to 10 % too large; 0: no hole
     glm::dvec3 centre{0};  ///< centre of the ball [m]
 };
 
-/// Finds the widest hole with at least a minimum width. Parts that protrude from a solid and have no interior also
+/// Finds the widest hole with at least a minimum width. The minimum decides whether it is found, not its width. Parts that protrude from a solid and have no interior also
 /// count as a hole where winding numbers of one half surround them. The mesh must be valid and face outward (see
 /// orient()).
 /// @param least     minimum width [m], positive

@@ -3,7 +3,10 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <bilayer/collider/field.h>
@@ -13,6 +16,7 @@
 #include "query_points.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
+#include "tests/support/truth.h"
 
 using namespace bilayer;
 using namespace bilayer::detail;
@@ -26,6 +30,78 @@ Mesh crumpled(Random& random) {
     Mesh mesh = random(0, 1) < 0.5 ? shapes::torus(1, 0.3f, 24, 12) : shapes::sphere(1, 3);
     for (glm::vec3& p : mesh.points) p += noise * random.point(1);
     return tilted(mesh);
+}
+
+// A thin box or needle, at random.
+Mesh sliver(Random& random) {
+    const float thickness = std::pow(10.f, float(random(-4, -0.5)));
+    const Mesh bar = random(0, 1) < 0.5 ? shapes::box({1, 0.3f, thickness}) : shapes::cone(thickness, 2, 3);
+    const glm::mat4 rotation = glm::rotate(glm::mat4(1), float(random(0, glm::two_pi<double>())), random.direction());
+    return shapes::moved(transformed(bar, rotation), random.point(0.3));
+}
+
+// Closed meshes whose surfaces meet, each with its own kind of wrong normals.
+struct MeetingSurfaces {
+    std::string name;
+    Mesh mesh;
+};
+
+std::vector<MeetingSurfaces> meetingSurfaces(Random& random) {
+    const Mesh ball = shapes::sphere(1, 3), core = shapes::sphere(float(random(0.2, 0.95)), 2);
+    const Mesh wall = shapes::box({1, 1, 0.1f}, 2);
+    const glm::vec3 shift = 0.02f * random.direction();
+    Mesh slivers = sliver(random);
+    for (int i = 0; i < 7; ++i) slivers = shapes::join({slivers, sliver(random)});
+    return {{"crossed bars", shapes::join({shapes::box({1, 0.2f, 0.2f}), shapes::box({0.2f, 1, 0.3f})})},
+            {"slivers", slivers},
+            {"a hollow ball", shapes::join({ball, shapes::flipped(core)})},
+            {"a ball in a ball", shapes::join({ball, core})},
+            {"walls almost in one place", shapes::join({wall, shapes::moved(wall, shift)})},
+            {"boxes that share an edge",
+             shapes::join({shapes::box(glm::vec3(0.5f)), shapes::moved(shapes::box(glm::vec3(0.5f)), {1, 1, 0})})},
+            {"a crumpled surface", crumpled(random)}};
+}
+
+// Points whose side a query got wrong, of all whose winding number defines a side.
+struct WrongSides {
+    std::size_t points = 0, closest = 0, inside = 0, sample = 0;
+    std::size_t close = 0, closeClosest = 0;  // where signs come from normals, and samples may err as normals do
+};
+
+constexpr double samePlace = 1e-4;  // closer points may be on either side [voxels]
+constexpr double unchecked = 0.1;   // so close, samples cannot check normals [voxels]
+constexpr double maxError = 0.87;   // of samples: half a cell's diagonal [voxels]
+
+WrongSides wrongSides(const LevelSet& levelSet, const Mesh& mesh, std::span<const glm::vec3> points) {
+    const Field field(levelSet, mesh);
+    const Truth truth(mesh);
+    const double voxel = double(field.voxelSize());
+    const bool byNormals = levelSet.sign() == "normals";
+    WrongSides wrong;
+    for (const glm::vec3& p : points) {
+        const double distance = truth.distance(glm::dvec3(p)) / voxel;
+        const int winding = truth.winding(glm::dvec3(p));
+        if (winding < 0 || distance < (byNormals ? unchecked : samePlace)) continue;
+        const bool inside = winding > 0, closestInside = field.closest(p).distance < 0;
+        ++wrong.points;
+        wrong.inside += field.inside(p) != closestInside;
+        if (byNormals && distance < maxError) {
+            ++wrong.close;
+            wrong.closeClosest += closestInside != inside;
+            continue;
+        }
+        wrong.closest += closestInside != inside;
+        wrong.sample += distance > maxError && (field.sample(p).distance < 0) != inside;
+    }
+    return wrong;
+}
+
+void requireNone(const WrongSides& wrong, std::size_t oneWrongIn) {
+    CAPTURE(wrong.points, wrong.close);
+    CHECK(wrong.closest == 0);
+    CHECK(wrong.inside == 0);
+    CHECK(wrong.sample == 0);
+    CHECK(wrong.closeClosest <= wrong.close / oneWrongIn);
 }
 
 // Counts how often queries contradict each other at points of the band, of the box, and far away.
@@ -94,5 +170,38 @@ TEST_CASE("closest, inside and sample agree on the side for any mesh and sign me
             if (levelSet.signConflicts() > 0 || sign == Sign::flood) found.sample = 0;
             requireNone(found);
         }
+    }
+}
+
+TEST_CASE("closest, inside and sample have the side of the winding number where surfaces meet") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int round = 0; round < 3; ++round)
+        for (const auto& [name, shape] : meetingSurfaces(random)) {
+            const Mesh mesh = tilted(shape);
+            const float voxelSize = voxelSizeFor(mesh, float(random(12, 50)));
+            const LevelSet levelSet = build(mesh, {.voxelSize = voxelSize});
+            CAPTURE(round, name, voxelSize, levelSet.signReason());
+            // signs of a flood, and of voxels that contradict each other, are not those of winding numbers
+            if (levelSet.sign() == "flood" || levelSet.signConflicts() > 0) continue;
+            requireNone(wrongSides(levelSet, mesh, pointsAround(mesh, 0.4 * double(voxelSize), 3000, seed)), 500);
+        }
+}
+
+TEST_CASE("closest, inside and sample have the side of the winding number on public meshes that meet themselves") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    for (const char* name : {"../cases/sliver110.obj", "../cases/crossed-bars.obj", "diff_ring.stl"}) {
+        const auto path = corpusMesh(name);
+        if (!path) continue;
+        CAPTURE(name);
+        const Mesh mesh = readMesh(*path);
+        const LevelSet levelSet = build(mesh, {.voxelSize = voxelSizeFor(mesh, 64)});
+        Random random(seed);
+        const Bounds box = bounds(mesh);
+        std::vector<glm::vec3> points = pointsAround(mesh, double(levelSet.voxelSize()), 10000, seed);
+        for (int i = 0; i < 50000; ++i) points.push_back(box.centre() + random.point(0.5 * double(box.longestSide())));
+        requireNone(wrongSides(levelSet, mesh, points), 10000);
     }
 }

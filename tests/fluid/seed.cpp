@@ -180,6 +180,41 @@ TEST_CASE("a wide hole is rejected by name") {
         }
 }
 
+TEST_CASE("the voxels that the error about a hole recommends are accepted, and slightly smaller ones are refused") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> part(0, 1);
+    const auto why = [](const Mesh& mesh, const Pose& pose, float voxel) -> std::string {
+        try {
+            fluid::seed(*emptyLiquid(voxel), mesh, pose);
+        } catch (const std::invalid_argument& error) {
+            return error.what();
+        }
+        return "";
+    };
+    const auto check = [&](const Mesh& mesh, float voxel) {
+        const Pose pose = poseOf(6 * part(random), glm::vec3(part(random), part(random), part(random)));
+        const std::string before = why(mesh, pose, voxel), recommends = "or take voxels of ";
+        CAPTURE(voxel, before);
+        REQUIRE_THAT(before, Catch::Contains(recommends));
+        const float recommended = std::stof(before.substr(before.find(recommends) + recommends.size()));
+        CHECK(recommended > voxel);
+        CHECK(why(mesh, pose, recommended).find("open") == std::string::npos);
+        CHECK_THAT(why(mesh, pose, 0.985f * recommended), Catch::Contains("the mesh is open"));
+    };
+    for (int i = 0; i < 6; ++i) {
+        const float height = 0.5f - 0.12f * (0.2f + part(random)), size = 0.1f + 10 * part(random);
+        Mesh mesh = shapes::sphere(0.5f, 4);
+        std::erase_if(mesh.triangles, [&](const glm::uvec3& t) {
+            return mesh.points[t.x].z + mesh.points[t.y].z + mesh.points[t.z].z > 3 * height;
+        });
+        for (glm::vec3& p : mesh.points) p *= size;
+        check(mesh, size * (0.03f + 0.05f * part(random)));
+    }
+    if (const auto path = corpusMesh("bunny_5k_open.obj")) check(readMesh(*path), 0.00733f);
+}
+
 TEST_CASE("subtract and intersect") {
     const LevelSet field = fieldOf(shapes::sphere(0.5f, 5), 0.02f);
     const auto liquid = openvdb::tools::createLevelSetSphere<FloatGrid>(0.5f, openvdb::Vec3f(0.5f, 0, 0), 0.025f, 3);

@@ -58,6 +58,16 @@ TEST_CASE("holes narrower than asked for, and closed meshes, have no width") {
     CHECK(widestHole(apart, 0.1).width == 0);
 }
 
+TEST_CASE("the minimum width decides whether a hole is found, not how wide it is") {
+    for (const float angle : {0.15f, 0.3f, 0.6f}) {
+        const Mesh mesh = ballWithHole(0.5f, angle);
+        const double width = widestHole(mesh, 0.05).width;
+        CAPTURE(angle, width);
+        for (const double part : {0.3, 0.8, 0.95, 0.9999}) CHECK(widestHole(mesh, part * width).width == width);
+        CHECK(widestHole(mesh, 1.0001 * width).width == 0);
+    }
+}
+
 TEST_CASE("the width of a hole does not depend on how the mesh lies") {
     const unsigned seed = test::seed();
     CAPTURE(seed);

@@ -41,6 +41,7 @@ constexpr float rounding = 1e-5f;     // tolerance of a width that is a whole nu
 constexpr double maxIndex = 1 << 29;  // keeps OpenVDB's 32-bit coordinates and sums of two of them in range
 constexpr double sameVoxels = 1e-6;   // relative tolerance of equal voxel sizes
 constexpr double maxHoleWidth = 2;    // [voxels]; wider holes are not closed
+constexpr double spareWidth = 1e-3;   // relative: what other voxels may change in the width of a hole by rounding
 
 // A mesh in voxels near the origin, where floats are most precise, and its translation by whole leaves.
 struct Placed {
@@ -116,6 +117,12 @@ std::string text(const openvdb::Vec3d& v) {
     return fmt::format("({:g}, {:g}, {:g})", v.x(), v.y(), v.z());
 }
 
+// The next number of three digits.
+double roundedUp(double value) {
+    const double unit = std::pow(10, std::floor(std::log10(value)) - 2);
+    return std::ceil(value / unit) * unit;
+}
+
 [[noreturn]] void refuseWithoutInside(const std::string& why) {
     throw std::invalid_argument("the mesh has no inside: " + why);
 }
@@ -134,7 +141,7 @@ void requireSolid(const Placed& body, const Transform& voxels) {
         "the mesh is open: its widest hole, around {}, is {:.3g} wide; {:g} voxels of {:g} are closed: close it in the "
         "mesh, or take voxels of {:.3g} or more",
         text(voxels.indexToWorld(centre + body.shift.asVec3d())), hole.width * voxel, maxHoleWidth, voxel,
-        hole.width * voxel / maxHoleWidth));
+        roundedUp((1 + spareWidth) * hole.width * voxel / maxHoleWidth)));
 }
 
 }  // namespace

@@ -1,0 +1,141 @@
+// The traversal of a mesh's tree along a ray, nearest nodes first. SIMD tests in single precision reject triangles
+// conservatively. Highway includes this file once for each instruction set: only between HWY_BEFORE_NAMESPACE's headers
+// and its own, after hwy/highway.h.
+// Tested by tests/collider/mesh_rays.cpp.
+#if defined(BILAYER_COLLIDER_RAY_TRAVERSAL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef BILAYER_COLLIDER_RAY_TRAVERSAL_H
+#undef BILAYER_COLLIDER_RAY_TRAVERSAL_H
+#else
+#define BILAYER_COLLIDER_RAY_TRAVERSAL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "collider/field/mesh_tree.h"
+#include "collider/field/path.h"
+#include "collider/field/tree_place.h"
+#include "sdf/bvh/node_stack.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+namespace {
+
+/// Min speed along an axis; below it the ray moves less than a voxel over the longest path.
+constexpr float slowest = 1e-9f;
+/// Tolerance for the rounding of a quotient.
+constexpr float quotientRoundUp = 1 + 1e-6f;
+
+// The traversal of one tree along one path.
+class RayTraversal {
+  public:
+    RayTraversal(const MeshTree& mesh, const Path& path)
+        : tree_(mesh.tree()),
+          place_(mesh, path.origin),
+          direction_(path.direction),
+          perMetre_(1 / double(mesh.voxelSize())) {
+        for (int k = 0; k < 3; ++k) {
+            const bool down = direction_[k] < 0;
+            perDirection_[k] = (down ? -1 : 1) / std::max(std::abs(direction_[k]), slowest);
+            forward_[k] = !down;
+            nearOrigin_[k] = place_.point[k] + (down ? -place_.slack : place_.slack);
+            farOrigin_[k] = place_.point[k] - (down ? -place_.slack : place_.slack);
+        }
+        limitTo(path.length);
+    }
+
+    // Ignores triangles farther along the path [m].
+    void limitTo(double along) {
+        limit_ = std::min(float(along * perMetre_) * quotientRoundUp + place_.slack, std::numeric_limits<float>::max());
+    }
+
+    // Calls visit(triangle) for each triangle that the path may meet. A long triangle may be visited several times.
+    template <class Visit>
+    void run(Visit visit) {
+        descend(
+            tree_, tree_.root(), [&](float key) { return key > limit_; },
+            [&](std::uint32_t group, NodeStack& stack) { open(tree_.groups[group], stack); },
+            [&](std::uint32_t leaf) { return visitLeaf(tree_.leaves[leaf], visit), false; });
+    }
+
+  private:
+    // Slab test: T. Kay, J. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986, 269-278.
+    void open(const BoxGroup& group, NodeStack& stack) const {
+        const Tag tag;
+        alignas(64) float enters[treeWidth];
+        unsigned met = 0;
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+            Vec enter = hn::Zero(tag), leave = hn::Set(tag, limit_);
+            for (int k = 0; k < 3; ++k) {
+                const float* first = forward_[k] ? group.lower[k] : group.upper[k];
+                const float* second = forward_[k] ? group.upper[k] : group.lower[k];
+                const Vec per = hn::Set(tag, perDirection_[k]);
+                enter = hn::Max(enter, hn::Mul(hn::Sub(hn::Load(tag, first + i), hn::Set(tag, nearOrigin_[k])), per));
+                leave = hn::Min(leave, hn::Mul(hn::Sub(hn::Load(tag, second + i), hn::Set(tag, farOrigin_[k])), per));
+            }
+            hn::Store(enter, tag, enters + i);
+            met |= bitsOf(hn::Le(enter, hn::Mul(leave, hn::Set(tag, quotientRoundUp)))) << i;
+        }
+        stack.pushChildren(met, enters, group.firstChild);
+    }
+
+    // A bit mask of the triangles that the line passes, each in its own frame. All terms are multiplied by the cosine
+    // between line and normal. Distances in the plane thereby become distances from the line, at any angle.
+    unsigned passed(const WideLeaf& leaf, std::size_t i) const {
+        const Tag tag;
+        const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
+        const auto dot = [&](const Vec* a, const Vec* b) {
+            return hn::Add(hn::Add(hn::Mul(a[0], b[0]), hn::Mul(a[1], b[1])), hn::Mul(a[2], b[2]));
+        };
+        const auto det = [&](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, d), hn::Mul(b, c)); };
+        Vec q[3], d[3], n[3], a[3];
+        for (int k = 0; k < 3; ++k) {
+            q[k] = place_.from(leaf, load, k);
+            d[k] = hn::Set(tag, direction_[k]);
+            n[k] = load(leaf.normal[k]);
+            a[k] = load(leaf.along[k]);
+        }
+        const Vec b[3] = {det(n[1], n[2], a[1], a[2]), det(n[2], n[0], a[2], a[0]), det(n[0], n[1], a[0], a[1])};
+        const Vec height = dot(q, n), fall = dot(d, n), steep = hn::Abs(fall);
+        const auto upright = [&](Vec v) { return hn::Xor(v, hn::And(fall, hn::SignBit(tag))); };
+        const Vec x = upright(det(dot(q, a), dot(d, a), height, fall));
+        const Vec y = upright(det(dot(q, b), dot(d, b), height, fall)), along = upright(hn::Neg(height));
+
+        const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
+        const Vec acrossBC = det(bcx, bcy, hn::Sub(x, hn::Mul(load(leaf.lengthAB), steep)), y);
+        const Vec acrossAC = det(x, y, load(leaf.directionAC[0]), load(leaf.directionAC[1]));
+        // the sum of the coordinates is an upper bound of the distance
+        const Vec away = hn::Add(hn::Add(hn::Abs(q[0]), hn::Abs(q[1])), hn::Abs(q[2]));
+        const Vec room = hn::Add(hn::Mul(hn::Set(tag, passRounding), away), hn::Set(tag, passTolerance));
+        const Vec inside = hn::Min(hn::Min(y, along), hn::Min(acrossBC, acrossAC));
+        return bitsOf(hn::And(hn::Ge(hn::Add(inside, room), hn::Zero(tag)),
+                              hn::Le(along, hn::Add(hn::Mul(hn::Set(tag, limit_), steep), room))));
+    }
+
+    template <class Visit>
+    void visitLeaf(const WideLeaf& leaf, Visit& visit) const {
+        unsigned bits = 0;
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(Tag())) bits |= passed(leaf, i) << i;
+        for (; bits != 0; bits &= bits - 1) visit(leaf.triangles[std::countr_zero(bits)]);
+    }
+
+    const WideTree& tree_;
+    TreePlace place_;
+    glm::vec3 direction_;
+    double perMetre_;
+    float limit_ = 0;
+    float perDirection_[3], nearOrigin_[3], farOrigin_[3];
+    bool forward_[3];
+};
+
+}  // namespace
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
