@@ -111,7 +111,7 @@ class AssimpScene {
         polygons_.notes.push_back(fmt::format(
             "the importer has single precision and rounds coordinates that are {:.6g} m from zero by up to {:.2g} m, "
             "for a mesh of {:.6g} m; move the mesh near to zero, or save it as OBJ or as PLY of doubles",
-            farthest_, farthest_ * 0.5 * double(std::numeric_limits<float>::epsilon()), size));
+            farthest_, farthest_ * floatRounding, size));
     }
 
     ScenePart part(unsigned index) {

@@ -37,7 +37,7 @@ class EarClipper {
     enum class Rule {
         strict,    ///< the cut touches the outline only at its ends
         touching,  ///< the interior of the cut may touch the outline
-        flat,      ///< corners without area: on a straight line, or where the outline reverses
+        flat,      ///< corners on a straight line
         convex,    ///< any convex corner; triangles may overlap
         any,       ///< any corner; triangles may be folded over
     };

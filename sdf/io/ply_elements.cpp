@@ -14,6 +14,8 @@
 namespace bilayer::detail {
 namespace {
 
+constexpr double maxWhole = 0x1p53;  // of a count or an index that is stored as a real: greater doubles skip numbers
+
 /// Reads consecutive values from binary data.
 class BinaryValues {
   public:
@@ -202,9 +204,8 @@ class RecordReader {
     /// Reads the count or an item of a list. Some programs write them as reals.
     long long readWhole(Values& values, PlyType type, const PlyProperty& list, std::size_t index) const {
         if (isInteger(type)) return values.integer(type);
-        constexpr double max = 0x1p53;  // greater doubles have no fraction
         const double value = values.real(type);
-        if (!(std::abs(value) <= max) || value != std::trunc(value))
+        if (!(std::abs(value) <= maxWhole) || value != std::trunc(value))
             values.fail(fmt::format("{}: its list {} has {} where a whole number should stand", name(index),
                                     quotedWord(list.name), value));
         return static_cast<long long>(value);

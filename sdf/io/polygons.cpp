@@ -241,7 +241,6 @@ Mesh meshOf(PolygonsOf<Scalar> polygons, ReadReport& report) {
 }  // namespace
 
 bool isTooFarForFloats(double farthest, double size) {
-    constexpr double floatRounding = 0.5 * std::numeric_limits<float>::epsilon();
     return size > 0 && std::isfinite(farthest) && farthest * floatRounding > maxRounding * size;
 }
 

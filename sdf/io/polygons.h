@@ -83,6 +83,9 @@ void takeFaces(Polygons& polygons, std::vector<Part>& parts) {
     setFaces(polygons, faces);
 }
 
+/// Largest relative error of a real number that is rounded to a float.
+inline constexpr double floatRounding = 0x1p-24;
+
 /// Returns whether floats may round coordinates of this magnitude by more than 1e-6 of the mesh's size. Such a mesh
 /// gets its own origin.
 /// @param farthest  largest magnitude of a coordinate [m]
