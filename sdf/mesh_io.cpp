@@ -19,6 +19,7 @@ Mesh readByEnding(const std::filesystem::path& path, ReadReport& report) {
     if (ending == ".ply") return readPly(path, report);
     if (ending == ".stl") return readStl(path, report);
     if (ending == ".off") return readOff(path, report);
+    if (ending == ".raw") return readRaw(path, report);
     requireInputFile(path);
     return assembled(readScene(path), path, report);
 }

@@ -18,7 +18,7 @@ struct ReadReport {
     std::size_t unusedVertices = 0;      ///< removed: no face uses them
     std::size_t collapsedTriangles = 0;  ///< removed: two corners coincide
     /// What else was removed and why, one sentence per entry without a full stop. Also lists faces whose outline
-    /// crosses itself.
+    /// crosses itself, and coordinates that Assimp has rounded by more than 1e-6 of the mesh's size.
     std::vector<std::string> notes;
 };
 
@@ -28,12 +28,14 @@ struct MeshFile {
     ReadReport report;
 };
 
-/// Reads a mesh from OBJ, PLY, STL, OFF, glTF or any other format that Assimp supports. The file extension selects the
-/// format.
+/// Reads a mesh from OBJ, PLY, STL, OFF, RAW, glTF or any other format that Assimp supports. The file extension selects
+/// the format.
 ///
 /// Joins all meshes of the scene under their node transforms, triangulates polygons and welds the result (see weld()).
-/// Coordinates are read in double precision. A mesh farther from the world origin than 1000 times its size is moved
-/// near to it, and Mesh::origin stores the shift.
+/// Coordinates are read in double precision; Assimp has single precision. A mesh so far from the world origin that
+/// floats would round its coordinates by more than 1e-6 of its size is moved near to it, and Mesh::origin stores the
+/// shift. That is so from 16.8 times its size on.
+///
 /// Throws std::runtime_error if the file cannot be read or holds no triangle. The error names the file and, where
 /// known, the line and its text. Throws std::invalid_argument for coordinates that are not finite.
 Mesh readMesh(const std::filesystem::path& path);

@@ -17,8 +17,7 @@
 namespace bilayer::python {
 namespace {
 
-/// Above this ratio of distance from zero to size, float32 rounds coordinates by more than 6e-5 of the size, and
-/// read_mesh() uses an origin.
+/// Above this ratio of distance from zero to size, float32 rounds coordinates by more than 6e-5 of the size.
 constexpr double farSizes = 1000;
 
 // Refuses double coordinates that float32 cannot hold next to the size of the mesh.

@@ -8,9 +8,13 @@
 #include <assimp/Importer.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
 #include <fstream>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -73,7 +77,7 @@ class AssimpScene {
             ++nodes_;
             shown_ += node->mNumMeshes;
             const glm::dmat4 world = parent * columns(node->mTransformation);
-            for (unsigned i = 0; i < node->mNumMeshes; ++i) place(polygons_, part(node->mMeshes[i]), world);
+            for (unsigned i = 0; i < node->mNumMeshes; ++i) add(part(node->mMeshes[i]), world);
             for (unsigned i = node->mNumChildren; i > 0; --i) open.push_back({node->mChildren[i - 1], world});
         }
         if (pointsAndLines_ > 0)
@@ -81,10 +85,35 @@ class AssimpScene {
         if (polygons_.corners.empty())
             polygons_.notes.push_back(fmt::format("the scene shows {} meshes; the file has {} meshes and {} nodes",
                                                   shown_, scene_.mNumMeshes, nodes_));
+        noteRounding();
         return std::move(polygons_);
     }
 
   private:
+    void add(const ScenePart& part, const glm::dmat4& world) {
+        const std::size_t first = polygons_.points.size();
+        place(polygons_, part, world);
+        double scale = 0, farthest = 0;
+        for (int axis = 0; axis < 3; ++axis) scale = std::max(scale, glm::length(glm::dvec3(world[axis])));
+        for (const unsigned corner : part.corners) {
+            const glm::dvec3 &local = part.points[corner], &placed = polygons_.points[first + corner];
+            farthest = std::max({farthest, std::abs(local.x), std::abs(local.y), std::abs(local.z)});
+            lower_ = glm::min(lower_, placed);
+            upper_ = glm::max(upper_, placed);
+        }
+        farthest_ = std::max(farthest_, scale * farthest);
+    }
+
+    void noteRounding() {
+        const glm::dvec3 sides = upper_ - lower_;
+        const double size = std::max({sides.x, sides.y, sides.z});
+        if (!isTooFarForFloats(farthest_, size)) return;
+        polygons_.notes.push_back(fmt::format(
+            "the importer has single precision and rounds coordinates that are {:.6g} m from zero by up to {:.2g} m, "
+            "for a mesh of {:.6g} m; move the mesh near to zero, or save it as OBJ or as PLY of doubles",
+            farthest_, farthest_ * floatRounding, size));
+    }
+
     ScenePart part(unsigned index) {
         if (index >= scene_.mNumMeshes)
             throw std::runtime_error(fmt::format("names mesh {}, but has {}", index, scene_.mNumMeshes));
@@ -113,6 +142,8 @@ class AssimpScene {
     const aiScene& scene_;
     Polygons polygons_;
     std::size_t pointsAndLines_ = 0, nodes_ = 0, shown_ = 0;  // shown: count of mesh instances
+    glm::dvec3 lower_{std::numeric_limits<double>::infinity()}, upper_{-std::numeric_limits<double>::infinity()};
+    double farthest_ = 0;  // largest magnitude of a coordinate before the translation of its node [m]
 };
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
+#include <utility>
 
 #include "sdf/base/line_side.h"
 
@@ -49,7 +51,42 @@ bool reverses(const glm::dvec2& p, const glm::dvec2& q, const glm::dvec2& r) {
     return dotOf(p - q, r - q) > 0 && lineSide(p, q, r) == 0;
 }
 
-// Calls f(previous, corner, next) for each corner, skipping repeated points.
+// Compares directions from a point by their angles from a first one, counter-clockwise.
+class AngleOrder {
+  public:
+    AngleOrder(const glm::dvec2& centre, const glm::dvec2& first) : centre_(centre), first_(first) {}
+
+    bool isZero(const glm::dvec2& p) const { return sector(p) == 0; }
+    bool isLess(const glm::dvec2& p, const glm::dvec2& q) const {
+        const int ofP = sector(p), ofQ = sector(q);
+        return ofP != ofQ ? ofP < ofQ : ofP % 2 == 1 && lineSide(centre_, p, q) > 0;
+    }
+
+  private:
+    // 0: along the first direction; 1: to its left; 2: opposite; 3: to its right
+    int sector(const glm::dvec2& p) const {
+        const int side = lineSide(centre_, first_, p);
+        if (side != 0) return side > 0 ? 1 : 3;
+        return dotOf(first_ - centre_, p - centre_) > 0 ? 0 : 2;
+    }
+
+    glm::dvec2 centre_, first_;
+};
+
+// Returns whether an outline that only turns left does so by one revolution: there is one corner that is leftmost among
+// its neighbours.
+bool turnsOnce(std::span<const glm::dvec2> outline) {
+    const std::size_t n = outline.size();
+    const auto isLeft = [&](std::size_t i, std::size_t j) {
+        const glm::dvec2 &p = outline[i % n], &q = outline[j % n];
+        return p.x < q.x || (p.x == q.x && p.y < q.y);
+    };
+    std::size_t leftmost = 0;
+    for (std::size_t i = n; i < 2 * n; ++i) leftmost += isLeft(i, i - 1) && isLeft(i, i + 1);
+    return leftmost == 1;
+}
+
+// Calls f(previous, corner, next) with the index of each corner, skipping repeated points.
 template <typename F>
 void forEachCorner(std::span<const glm::dvec2> outline, const F& f) {
     const std::size_t n = outline.size();
@@ -60,7 +97,7 @@ void forEachCorner(std::span<const glm::dvec2> outline, const F& f) {
     for (std::size_t i = before, count = 0; count < n; ++count) {
         i = next(i);
         if (outline[i] == outline[next(i)]) continue;
-        f(outline[before], outline[i], outline[next(i)]);
+        f(unsigned(before), unsigned(i), unsigned(next(i)));
         before = i;
     }
 }
@@ -73,10 +110,10 @@ int EarClipper::side(unsigned a, unsigned b, unsigned p) const {
 
 bool EarClipper::clip(std::span<const glm::dvec2> outline, std::vector<glm::uvec3>& triangles) {
     link(outline);
-    bool fits = true;
+    if (!wasConvex_) separate(triangles);
     tryAll();
-    for (auto rule = Rule::strict; left_ > 3;) {
-        fits &= rule < Rule::convex;
+    for (auto rule = Rule::strict; left_ > 0;) {
+        fits_ &= rule < Rule::convex;
         const bool all = tried_.size() == left_;
         if (playRound(rule, triangles))
             rule = Rule::strict;
@@ -87,24 +124,23 @@ bool EarClipper::clip(std::span<const glm::dvec2> outline, std::vector<glm::uvec
         else
             tryChanged();
     }
-    const auto last =
-        unsigned(std::find_if(corners_.begin(), corners_.end(), [](auto& c) { return c.present; }) - corners_.begin());
-    fits &= side(corners_[last].before, last, corners_[last].after) >= 0;
-    cut(last, triangles);
-    return fits;
+    return fits_;
 }
 
 void EarClipper::link(std::span<const glm::dvec2> outline) {
     left_ = unsigned(outline.size());
     round_ = 0;
+    fits_ = true;
     corners_.resize(left_);
     obstacles_.reset(outline);
     for (unsigned i = 0; i < left_; ++i)
-        corners_[i] = {outline[i], i > 0 ? i - 1 : left_ - 1, i + 1 < left_ ? i + 1 : 0, 0, true, true};
+        corners_[i] = {outline[i], i > 0 ? i - 1 : left_ - 1, i + 1 < left_ ? i + 1 : 0, 0, true, true, false};
     for (unsigned i = 0; i < left_; ++i) classify(i);
-    wasConvex_ = std::all_of(corners_.begin(), corners_.end(), [](const Corner& corner) { return corner.convex; });
-    spikes_ = wasConvex_ ? Spikes::inward : spikesOf(outline);
+    wasConvex_ = std::all_of(corners_.begin(), corners_.end(), [](const Corner& corner) { return corner.convex; }) &&
+                 turnsOnce(outline);
+    if (!wasConvex_) findFullAngles(outline);
     next_.clear();
+    changed_.clear();
 }
 
 void EarClipper::tryAll() {
@@ -124,24 +160,111 @@ bool EarClipper::playRound(Rule rule, std::vector<glm::uvec3>& triangles) {
     ++round_;
     bool any = false;
     for (const unsigned v : tried_) {
-        if (left_ == 3) break;
         if (!corners_[v].present || corners_[v].round == round_ || !mayCut(v, rule)) continue;
         cut(v, triangles);
+        cutEmpty(triangles);
         any = true;
     }
     return any;
 }
 
 void EarClipper::cut(unsigned v, std::vector<glm::uvec3>& triangles) {
-    Corner& corner = corners_[v];
-    triangles.push_back({corner.before, v, corner.after});
-    corner.present = false;
-    if (!corner.convex) obstacles_.remove(v);
-    corners_[corner.before].after = corner.after;
-    corners_[corner.after].before = corner.before;
+    const unsigned a = corners_[v].before, b = corners_[v].after;
+    triangles.push_back({a, v, b});
+    narrow(a, v, b);
+    narrow(b, v, a);
+    corners_[a].after = b;
+    corners_[b].before = a;
+    remove(v);
+    if (finish(a, triangles)) return;
+    for (const unsigned corner : {a, b}) {
+        update(corner);
+        changed_.push_back(corner);
+    }
+}
+
+void EarClipper::remove(unsigned v) {
+    corners_[v].present = false;
+    if (!corners_[v].convex) obstacles_.remove(v);
     --left_;
-    update(corner.before);
-    update(corner.after);
+}
+
+// Removes the outline of a corner if it has at most three corners, and adds its last triangle.
+bool EarClipper::finish(unsigned v, std::vector<glm::uvec3>& triangles) {
+    const unsigned second = corners_[v].after, third = corners_[second].after;
+    if (corners_[third].after != v && third != v) return false;
+    if (third != v) {
+        const unsigned first = std::min({v, second, third});
+        triangles.push_back({corners_[first].before, first, corners_[first].after});
+        fits_ &= side(corners_[first].before, first, corners_[first].after) >= 0;
+        remove(third);
+    }
+    remove(v);
+    remove(second);
+    return true;
+}
+
+// Cuts repeated corners and outward spikes, as far as cuts have made some. Where they remain, parts of the outline lie
+// next to each other with nothing in between, and ears there cannot be told from their surroundings.
+void EarClipper::cutEmpty(std::vector<glm::uvec3>& triangles) {
+    while (!changed_.empty()) {
+        const unsigned v = changed_.back(), next = corners_[v].after;
+        if (corners_[v].present && corners_[v].at == corners_[next].at) {
+            cut(next, triangles);
+            continue;
+        }
+        changed_.pop_back();
+        if (corners_[v].present && isEmpty(v)) cut(v, triangles);
+    }
+}
+
+// Separates an outline where its inside is pinched to a point or to a line.
+void EarClipper::separate(std::vector<glm::uvec3>& triangles) {
+    for (auto v = unsigned(corners_.size()); v-- > 0;) changed_.push_back(v);
+    cutEmpty(triangles);
+    tryAll();
+    const auto position = [&](unsigned v) { return std::tuple(corners_[v].at.x, corners_[v].at.y, v); };
+    std::sort(tried_.begin(), tried_.end(), [&](unsigned v, unsigned w) { return position(v) < position(w); });
+    const auto differ = [&](unsigned v, unsigned w) { return corners_[v].at != corners_[w].at; };
+    for (auto begin = tried_.begin(); begin != tried_.end();) {
+        const auto end = std::find_if(begin, tried_.end(), [&](unsigned v) { return differ(*begin, v); });
+        for (auto v = begin; v != end; ++v)
+            for (auto w = begin; w != end;) {
+                const bool pinched = isPinched(*v, *w);
+                if (pinched) split(*v, *w, triangles);
+                w = pinched ? begin : w + 1;
+            }
+        begin = end;
+    }
+    cutEmpty(triangles);
+}
+
+// Returns whether two corners at the same point can be joined within the outline: the corner w arrives and leaves, in
+// this order, between the edges of v, on the inner side.
+bool EarClipper::isPinched(unsigned v, unsigned w) const {
+    const Corner &corner = corners_[v], &other = corners_[w];
+    if (v == w || !corner.present || !other.present || corner.after == w || other.after == v) return false;
+    const AngleOrder order(corner.at, corners_[corner.after].at);
+    const glm::dvec2 &end = corners_[corner.before].at, &in = corners_[other.before].at,
+                     &out = corners_[other.after].at;
+    if (order.isZero(out) || order.isLess(out, in)) return false;
+    if (!order.isLess(in, out) && !other.full) return false;
+    if (order.isZero(end)) return corner.full;
+    // if w runs along both edges of v, this point does not show on which side
+    return order.isLess(out, end) || (!order.isLess(end, out) && !order.isZero(in));
+}
+
+void EarClipper::split(unsigned v, unsigned w, std::vector<glm::uvec3>& triangles) {
+    triangles.push_back({corners_[v].before, v, w});
+    triangles.push_back({corners_[w].before, w, v});
+    std::swap(corners_[v].before, corners_[w].before);
+    for (const unsigned corner : {v, w}) {
+        corners_[corners_[corner].before].after = corner;
+        corners_[corner].full = false;
+        if (finish(corner, triangles)) continue;
+        classify(corner);
+        changed_.push_back(corner);
+    }
 }
 
 void EarClipper::update(unsigned v) {
@@ -162,14 +285,29 @@ void EarClipper::classify(unsigned v) {
         obstacles_.add(v, corner.at);
 }
 
+// Updates whether the interior angle at a corner is 360 degrees, before its edge to v becomes one to the corner behind
+// v.
+void EarClipper::narrow(unsigned at, unsigned v, unsigned to) {
+    Corner& corner = corners_[at];
+    const glm::dvec2 &from = corner.at, &across = corners_[v].at, &end = corners_[to].at;
+    if (from == across)
+        corner.full &= corners_[v].full;
+    else if (corners_[v].convex || dotOf(across - from, end - from) < 0)
+        corner.full = false;
+}
+
+bool EarClipper::isEmpty(unsigned v) const {
+    const Corner& corner = corners_[v];
+    return !corner.full && !corner.convex && reverses(corners_[corner.before].at, corner.at, corners_[corner.after].at);
+}
+
 bool EarClipper::mayCut(unsigned v, Rule rule) const {
     const Corner& corner = corners_[v];
     const glm::dvec2 &a = corners_[corner.before].at, &b = corners_[corner.after].at;
-    if (rule == Rule::any || corner.at == a || corner.at == b) return true;
+    if (rule == Rule::any) return true;
     if (rule == Rule::convex) return corner.convex;
     if (corner.convex) return rule != Rule::flat && isEar(v, rule);
-    if (rule == Rule::flat) return lineSide(a, corner.at, b) == 0;
-    return reverses(a, corner.at, b) && isOutwardSpike(v);
+    return rule == Rule::flat && lineSide(a, corner.at, b) == 0 && !corner.full;
 }
 
 bool EarClipper::isEar(unsigned v, Rule rule) const {
@@ -182,6 +320,7 @@ bool EarClipper::isEar(unsigned v, Rule rule) const {
 // Returns whether the cut leaves a positive angle at both of its ends. Angles of 180 degrees and more always remain.
 bool EarClipper::keepsAngles(unsigned v, Rule rule) const {
     const unsigned a = corners_[v].before, b = corners_[v].after;
+    if (isEmpty(a) || isEmpty(b)) return false;
     const int minSide = rule == Rule::strict ? 1 : 0;
     return (!corners_[a].convex || side(corners_[a].before, a, b) >= minSide) &&
            (!corners_[b].convex || side(a, b, corners_[b].after) >= minSide);
@@ -203,26 +342,30 @@ bool EarClipper::blocks(unsigned w, unsigned v, Rule rule) const {
     return enters(corners_[w].before) || enters(corners_[w].after);
 }
 
-// The total rotation of a simple outline is one revolution to the left. Outward spikes contribute half a revolution to
-// the left each, inward spikes half a revolution to the right. The other corners therefore determine the count of each
-// kind.
-EarClipper::Spikes EarClipper::spikesOf(std::span<const glm::dvec2> outline) {
+// Finds the corners whose interior angle is 360 degrees. The total rotation of a simple outline is one revolution to
+// the left. Outward spikes contribute half a revolution to the left each, inward spikes half a revolution to the right.
+// The other corners therefore determine the count of each kind.
+void EarClipper::findFullAngles(std::span<const glm::dvec2> outline) {
     long spikes = 0;
-    forEachCorner(outline, [&](auto& p, auto& q, auto& r) { spikes += reverses(p, q, r); });
-    if (spikes == 0) return Spikes::inward;
     double angle = 0;
-    forEachCorner(outline, [&](auto& p, auto& q, auto& r) {
-        if (!reverses(p, q, r)) angle += std::atan2(crossOf(q - p, r - q), dotOf(q - p, r - q));
+    forEachCorner(outline, [&](unsigned i, unsigned j, unsigned k) {
+        const glm::dvec2 &p = outline[i], &q = outline[j], &r = outline[k];
+        if (reverses(p, q, r))
+            ++spikes;
+        else
+            angle += std::atan2(crossOf(q - p, r - q), dotOf(q - p, r - q));
     });
+    if (spikes == 0) return;
     const long halfRevolutions = std::lround(angle / std::numbers::pi);
-    return halfRevolutions == 2 + spikes   ? Spikes::inward
-           : halfRevolutions == 2 - spikes ? Spikes::outward
-                                           : Spikes::both;
+    if (halfRevolutions == 2 - spikes) return;
+    forEachCorner(outline, [&](unsigned i, unsigned j, unsigned k) {
+        if (reverses(outline[i], outline[j], outline[k]) && (halfRevolutions == 2 + spikes || !isOutward(j)))
+            for (unsigned v = j; v != i && outline[v] == outline[j]; v = corners_[v].before) corners_[v].full = true;
+    });
 }
 
 // Returns whether a spike lies outside of the rest of the outline. A spike on the border counts as outside.
-bool EarClipper::isOutwardSpike(unsigned v) const {
-    if (spikes_ != Spikes::both) return spikes_ == Spikes::outward;
+bool EarClipper::isOutward(unsigned v) const {
     const glm::dvec2& point = corners_[v].at;
     int windings = 0;
     const unsigned first = corners_[v].after, last = corners_[v].before;

@@ -22,4 +22,8 @@ Mesh readStl(const std::filesystem::path& path, ReadReport& report);
 /// OFF as Geomview writes it, three-dimensional and as text.
 Mesh readOff(const std::filesystem::path& path, ReadReport& report);
 
+/// RAW: a triangle of nine numbers per line, with a colour before them or a texture's name behind; names of objects.
+/// Read sequentially.
+Mesh readRaw(const std::filesystem::path& path, ReadReport& report);
+
 }  // namespace bilayer::detail

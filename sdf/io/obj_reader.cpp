@@ -79,7 +79,8 @@ class PartReader {
         while (at_.end - at_.at >= 3 && std::memcmp(at_.at, "\xef\xbb\xbf", 3) == 0) at_.at += 3;
         at_.skipBlanks();
         const char* begin = at_.at;
-        const std::string_view word = at_.word();
+        while (!atWordEnd()) ++at_.at;
+        const std::string_view word(begin, std::size_t(at_.at - begin));
         if (word == "v") return readVertex();
         if (word == "f" || word == "fo") return readFace();
         if (word.empty() || word.front() == '#' || isOneOf(word, withoutShape)) return;
@@ -87,13 +88,19 @@ class PartReader {
         skip(isElement ? pointsAndLines : isOneOf(word, ofFreeForm) ? freeForm : unknown, begin);
     }
 
-    // Returns whether a backslash at the end of a line joins the next line to it.
-    bool atJoint() const { return at_.end - at_.at >= 2 && *at_.at == '\\' && isLineEnd(at_.at[1]); }
+    // Returns whether a backslash at the end of a line joins the next line to it. Blanks may follow it.
+    bool atJoint() const {
+        if (at_.atEnd() || *at_.at != '\\') return false;
+        Cursor rest{at_.at + 1, at_.end};
+        rest.skipBlanks();
+        return !rest.atEnd() && isLineEnd(*rest.at);
+    }
 
     void skipBlanks() {
         for (at_.skipBlanks(); atJoint(); at_.skipBlanks()) {
-            const bool both = at_.end - at_.at >= 3 && at_.at[1] == '\r' && at_.at[2] == '\n';
-            at_.at += both ? 3 : 2;
+            at_.skipLine();
+            const bool both = at_.end - at_.at >= 2 && at_.at[0] == '\r' && at_.at[1] == '\n';
+            at_.at += both ? 2 : 1;
         }
     }
 
@@ -161,6 +168,12 @@ class PartReader {
     std::optional<Vertices> vertices_;
 };
 
+/// Returns whether a text ends with a backslash and blanks.
+bool endsWithJoint(const char* begin, const char* end) {
+    while (end != begin && isBlank(end[-1])) --end;
+    return end != begin && end[-1] == '\\';
+}
+
 /// Cuts a text into parts that begin at the start of a line that is not joined to the previous one.
 std::vector<ObjPart> cut(const TextSource& source) {
     std::vector<ObjPart> parts;
@@ -170,7 +183,7 @@ std::vector<ObjPart> cut(const TextSource& source) {
         const char* last = end;
         while (last != begin && isLineEnd(last[-1])) --last;
         // joined lines stay in the same part
-        while (end != source.end() && last != begin && last[-1] == '\\') {
+        while (end != source.end() && endsWithJoint(begin, last)) {
             while (end != source.end() && !isLineEnd(*end)) ++end;
             last = end;
             while (end != source.end() && isLineEnd(*end)) ++end;

@@ -14,19 +14,30 @@
 namespace bilayer::detail {
 namespace {
 
+constexpr double maxWhole = 0x1p53;  // of a count or an index that is stored as a real: greater doubles skip numbers
+
 /// Reads consecutive values from binary data.
 class BinaryValues {
   public:
-    BinaryValues(const PlyHeader& header, const PlyData& data) : header_(header), data_(data) {}
+    /// @param record  the number of the first record
+    BinaryValues(const PlyHeader& header, const PlyElement& element, const PlyData& data, std::size_t record)
+        : header_(header), element_(element), data_(data), record_(record) {}
 
     double real(PlyType type) { return loadAs<double>(type); }
     long long integer(PlyType type) { return loadAs<long long>(type); }
     void skip(PlyType type, std::uint64_t count) {
-        if (count > std::uint64_t(data_.size()) / sizeOf(type)) header_.failTooShort();
+        if (count > std::uint64_t(data_.size()) / sizeOf(type)) failTooShort();
         data_.at += count * sizeOf(type);
     }
+    /// Advances past records that have the same size [bytes].
+    void skipRecords(std::size_t count, std::size_t size) {
+        const std::size_t found = size > 0 ? std::min(count, data_.size() / size) : count;
+        data_.at += found * size;
+        record_ += found;
+        if (found < count) failTooShort();
+    }
 
-    void endRecord() const {}
+    void endRecord() { ++record_; }
 
     [[noreturn]] void fail(const std::string& why) const { header_.fail(why); }
 
@@ -41,55 +52,74 @@ class BinaryValues {
     }
 
     const char* take(std::size_t size) {
-        if (data_.size() < size) header_.failTooShort();
+        if (data_.size() < size) failTooShort();
         return std::exchange(data_.at, data_.at + size);
     }
 
+    [[noreturn]] void failTooShort() const {
+        fail(fmt::format("byte {}: {}", data_.end - header_.begin, header_.endsAfter(record_, element_)));
+    }
+
     const PlyHeader& header_;
+    const PlyElement& element_;
     PlyData data_;
+    std::size_t record_;
+};
+
+/// A text of values, and how its records are separated.
+struct PlyText {
+    const TextSource& source;
+    PlyTextLayout layout;
 };
 
 /// Reads consecutive values from text, whose words are values.
 class TextValues {
   public:
-    TextValues(const TextSource& source, Cursor& at) : source_(source), at_(at) {}
+    /// @param record  the number of the first record
+    TextValues(const PlyHeader& header, const PlyElement& element, const PlyText& text, Cursor& at, std::size_t record)
+        : header_(header), element_(element), text_(text), at_(at), record_(record) {}
 
     double real(PlyType) {
         double value = 0;
         const char* begin = next();
-        if (!at_.number(value) || !isAtWordEnd()) source_.failExpected(begin, "a number");
+        if (!at_.number(value) || !isAtWordEnd()) text_.source.failExpected(begin, "a number");
         return value;
     }
     long long integer(PlyType) {
         long long value = 0;
         const char* begin = next();
-        if (!at_.integer(value) || !isAtWordEnd()) source_.failExpected(begin, "an integer");
+        if (!at_.integer(value) || !isAtWordEnd()) text_.source.failExpected(begin, "an integer");
         return value;
     }
     void skip(PlyType, std::uint64_t count) {
         for (; count > 0; --count) {
-            const char* begin = next();
-            if (at_.word().empty()) source_.failExpected(begin, "a number");
+            next();
+            at_.word();
         }
     }
 
-    /// Each element has its own lines.
     void endRecord() {
+        ++record_;
+        if (text_.layout == PlyTextLayout::words) return;
         at_.skipBlanks();
-        if (!at_.atEnd() && !isLineEnd(*at_.at)) source_.failExpected(at_.at, "the end of the line");
+        if (!at_.atEnd() && !isLineEnd(*at_.at)) text_.source.failExpected(at_.at, "the end of the line");
     }
 
-    [[noreturn]] void fail(const std::string& why) const { source_.fail(at_.at, why); }
+    [[noreturn]] void fail(const std::string& why) const { text_.source.fail(at_.at, why); }
 
   private:
     const char* next() {
         at_.skipSpace();
+        if (at_.atEnd()) fail(header_.endsAfter(record_, element_));
         return at_.at;
     }
     bool isAtWordEnd() const { return at_.atEnd() || isSpace(*at_.at); }
 
-    const TextSource& source_;
+    const PlyHeader& header_;
+    const PlyElement& element_;
+    const PlyText& text_;
     Cursor& at_;
+    std::size_t record_;
 };
 
 /// Reads the records of an element one by one.
@@ -128,7 +158,8 @@ class RecordReader {
             }
             const std::uint64_t count = readCount(values, property, index);
             for (std::uint64_t k = 0; k < count; ++k)
-                faces.corners.push_back(requireVertex(values, values.integer(property.type), index));
+                faces.corners.push_back(
+                    requireVertex(values, readWhole(values, property.type, property, index), index));
         }
         faces.close(first);
         values.endRecord();
@@ -147,7 +178,7 @@ class RecordReader {
             unsigned strip[3];
             std::size_t length = 0;
             for (std::uint64_t k = 0; k < count; ++k) {
-                const long long corner = values.integer(property.type);
+                const long long corner = readWhole(values, property.type, property, index);
                 if (corner == -1) {
                     length = 0;
                     continue;
@@ -170,8 +201,18 @@ class RecordReader {
         values.skip(property.type, property.countType ? readCount(values, property, index) : 1);
     }
 
+    /// Reads the count or an item of a list. Some programs write them as reals.
+    long long readWhole(Values& values, PlyType type, const PlyProperty& list, std::size_t index) const {
+        if (isInteger(type)) return values.integer(type);
+        const double value = values.real(type);
+        if (!(std::abs(value) <= maxWhole) || value != std::trunc(value))
+            values.fail(fmt::format("{}: its list {} has {} where a whole number should stand", name(index),
+                                    quotedWord(list.name), value));
+        return static_cast<long long>(value);
+    }
+
     std::uint64_t readCount(Values& values, const PlyProperty& list, std::size_t index) const {
-        const long long count = values.integer(*list.countType);
+        const long long count = readWhole(values, *list.countType, list, index);
         if (count < 0)
             values.fail(fmt::format("{}: its list {} has {} items", name(index), quotedWord(list.name), count));
         return std::uint64_t(count);
@@ -204,8 +245,8 @@ std::size_t requireAxis(const PlyHeader& header, const PlyElement& element, cons
 
 std::size_t requireCorners(const PlyHeader& header, const PlyElement& element) {
     const auto found = element.findCorners();
-    if (!found || !element.properties[*found].countType || !isInteger(element.properties[*found].type))
-        header.fail(fmt::format("its element {} has no list 'vertex_indices' of integers", quotedWord(element.name)));
+    if (!found || !element.properties[*found].countType)
+        header.fail(fmt::format("its element {} has no list 'vertex_indices'", quotedWord(element.name)));
     return *found;
 }
 
@@ -243,7 +284,7 @@ Faces readPart(const PlyHeader& header, const PlyElement& element, Values values
 /// Returns the start of each task's data, and advances past all of them.
 std::vector<const char*> splitElement(const PlyHeader& header, const PlyElement& element, PlyData& data) {
     const RecordReader<BinaryValues> reader(header, element);
-    BinaryValues values(header, data);
+    BinaryValues values(header, element, data, 0);
     std::size_t size = 0;
     for (const PlyProperty& property : element.properties) size += sizeOf(property.type);
     std::vector<const char*> begins;
@@ -251,7 +292,7 @@ std::vector<const char*> splitElement(const PlyHeader& header, const PlyElement&
         const std::size_t end = std::min<std::size_t>(first + plyTaskElements, element.count);
         begins.push_back(values.data().at);
         if (!element.hasLists())
-            values.skip(PlyType::uint8, (end - first) * size);
+            values.skipRecords(end - first, size);
         else
             for (std::size_t i = first; i < end; ++i) reader.skip(values, i);
     }
@@ -261,10 +302,22 @@ std::vector<const char*> splitElement(const PlyHeader& header, const PlyElement&
 
 }  // namespace
 
+void requirePlyElements(const PlyHeader& header, const PlyElement& element, const TextSource& source, Cursor text,
+                        PlyTextLayout layout) {
+    const PlyText of{source, layout};
+    TextValues values(header, element, of, text, 0);
+    for (std::size_t i = 0; i < element.count; ++i) RecordReader<TextValues>(header, element).skip(values, i);
+}
+
+void requirePlyElements(const PlyHeader& header, const PlyElement& element, PlyData data) {
+    splitElement(header, element, data);
+}
+
 std::vector<Faces> readPlyElements(const PlyHeader& header, const PlyElement& element, const TextSource& source,
-                                   Cursor& text, std::span<glm::dvec3> points) {
+                                   Cursor& text, PlyTextLayout layout, std::span<glm::dvec3> points) {
+    const PlyText of{source, layout};
     return readRecords(text, element.count, [&](Cursor& at, std::size_t first, std::size_t count) {
-        return readPart(header, element, TextValues(source, at), first, count, points);
+        return readPart(header, element, TextValues(header, element, of, at, first), first, count, points);
     });
 }
 
@@ -274,8 +327,8 @@ std::vector<Faces> readPlyElements(const PlyHeader& header, const PlyElement& el
     const std::vector<const char*> begins = splitElement(header, element, data);
     std::vector<Faces> parts(begins.size());
     inOrder(begins.size(), [&](std::size_t i) {
-        const BinaryValues part(header, {begins[i], data.end, data.swapped});
         const std::size_t first = i * plyTaskElements;
+        const BinaryValues part(header, element, {begins[i], data.end, data.swapped}, first);
         const std::size_t count = std::min(plyTaskElements, std::size_t(element.count) - first);
         parts[i] = readPart(header, element, part, first, count, points);
     });

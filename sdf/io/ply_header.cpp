@@ -28,6 +28,7 @@ class PlyHeaderReader {
     PlyHeaderReader(const std::filesystem::path& path, const TextSource& source)
         : source_(source), at_{source.begin(), source.end()} {
         header_.path = path;
+        header_.begin = source.begin();
     }
 
     PlyHeader run() {
@@ -109,8 +110,6 @@ class PlyHeaderReader {
             property.countType = readType();
         else
             at_ = before;
-        if (property.countType && !isInteger(*property.countType))
-            source_.fail(before.at, "the counts of a list are of no integer type");
         property.type = readType();
         property.name = next("the name of a property");
         header_.elements.back().properties.push_back(property);
@@ -165,8 +164,9 @@ void PlyHeader::fail(const std::string& why) const {
     throw std::runtime_error(fmt::format("{}: {}", path.string(), why));
 }
 
-void PlyHeader::failTooShort() const {
-    fail("ends before all that its header announces");
+std::string PlyHeader::endsAfter(std::uint64_t records, const PlyElement& element) const {
+    return fmt::format("the file ends after {} of the {} elements {} that its header announces", records, element.count,
+                       quotedWord(element.name));
 }
 
 PlyHeader readPlyHeader(const std::filesystem::path& path, const TextSource& source) {

@@ -56,16 +56,16 @@ struct PlyHeader {
     std::filesystem::path path;  ///< the file, for errors
     PlyFormat format = PlyFormat::text;
     std::vector<PlyElement> elements;
-    std::uint64_t vertices = 0;  ///< count of vertices
-    const char* end = nullptr;   ///< start of the data
+    std::uint64_t vertices = 0;                   ///< count of vertices
+    const char *begin = nullptr, *end = nullptr;  ///< start of the file, and of the data
 
     /// Returns whether floats can represent all coordinates.
     bool storesFloats() const;
 
     /// Throws std::runtime_error that names the file.
     [[noreturn]] void fail(const std::string& why) const;
-    /// Throws std::runtime_error: the file is too short for the counts of its header.
-    [[noreturn]] void failTooShort() const;
+    /// Returns the reason for an error: the file ends after this count of records of an element.
+    std::string endsAfter(std::uint64_t records, const PlyElement& element) const;
 };
 
 /// Reads the lines up to `end_header`. Throws std::runtime_error that names the file and the line if they are not those

@@ -4,6 +4,7 @@
 #include <bit>
 #include <iterator>
 #include <span>
+#include <stdexcept>
 #include <utility>
 
 #include "sdf/base/large_array.h"
@@ -25,11 +26,14 @@ class PlyReader {
   public:
     explicit PlyReader(const PlyHeader& header) : header_(header) {}
 
-    PolygonsOf<Scalar> readText(const TextSource& source, Cursor text) {
+    /// Advances the text past what is read.
+    PolygonsOf<Scalar> readText(const TextSource& source, Cursor& text, PlyTextLayout layout) {
         for (const PlyElement& element : header_.elements) {
             if (element.properties.empty()) continue;
-            makeRoom(element, std::size_t(text.end - text.at), 2);
-            add(element, readPlyElements(header_, element, source, text, polygons_.points));
+            if (!mayHold(std::size_t(text.end - text.at), element, 2))
+                requirePlyElements(header_, element, source, text, layout);
+            makeRoom(element);
+            add(element, readPlyElements(header_, element, source, text, layout, polygons_.points));
         }
         text.skipSpace();
         if (!text.atEnd())
@@ -41,7 +45,8 @@ class PlyReader {
     PolygonsOf<Scalar> readBinary(PlyData data) {
         for (const PlyElement& element : header_.elements) {
             if (element.properties.empty()) continue;
-            makeRoom(element, data.size(), 1);
+            if (!mayHold(data.size(), element, 1)) requirePlyElements(header_, element, data);
+            makeRoom(element);
             if (readFixedVertices(element, data, polygons_.points)) continue;
             if (holdsAllFaces(element) && readFixedTriangles(element, header_.vertices, data, polygons_.triangles))
                 continue;
@@ -60,10 +65,12 @@ class PlyReader {
                              [](const PlyElement& e) { return e.hasFaces(); }) == 1;
     }
 
-    /// Checks before allocation that the file is large enough: each property of an element takes some bytes.
-    void makeRoom(const PlyElement& element, std::size_t bytes, std::size_t bytesOfProperty) {
-        const std::size_t size = element.properties.size() * bytesOfProperty;
-        if (size > 0 && element.count > (bytes + 1) / size) header_.failTooShort();
+    /// Returns whether so many bytes may hold an element, before memory is allocated: each property takes some bytes.
+    static bool mayHold(std::size_t bytes, const PlyElement& element, std::size_t bytesOfProperty) {
+        return element.count <= (bytes + 1) / (element.properties.size() * bytesOfProperty);
+    }
+
+    void makeRoom(const PlyElement& element) {
         if (element.kind() == PlyElementKind::vertex) resizeLarge(polygons_.points, element.count);
     }
 
@@ -84,14 +91,31 @@ class PlyReader {
     std::vector<Faces> faces_;
 };
 
+/// Reads records that are one per line. If they are not, reads them as a sequence of words, which must hold exactly
+/// what the header announces.
+Polygons readText(const PlyHeader& header, const TextSource& source) {
+    Cursor text{header.end, source.end()};
+    try {
+        return PlyReader<double>(header).readText(source, text, PlyTextLayout::lines);
+    } catch (const std::runtime_error&) {
+        try {
+            text = {header.end, source.end()};
+            Polygons polygons = PlyReader<double>(header).readText(source, text, PlyTextLayout::words);
+            if (text.atEnd()) return polygons;
+        } catch (const std::runtime_error&) {
+            // the error of the usual layout is reported
+        }
+        throw;
+    }
+}
+
 }  // namespace
 
 Mesh readPly(const std::filesystem::path& path, ReadReport& report) {
     const MappedFile file(path);
     const TextSource source(path, file.bytes());
     const PlyHeader header = readPlyHeader(path, source);
-    if (header.format == PlyFormat::text)
-        return assembled(PlyReader<double>(header).readText(source, {header.end, source.end()}), path, report);
+    if (header.format == PlyFormat::text) return assembled(readText(header, source), path, report);
     const bool isBig = std::endian::native == std::endian::big;
     const PlyData data{header.end, source.end(), (header.format == PlyFormat::binaryBig) != isBig};
     if (header.storesFloats()) return assembled(PlyReader<float>(header).readBinary(data), path, report);

@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -24,9 +26,7 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::size_t grain = 1 << 14;  // vertices or faces per task
-/// A mesh whose distance from zero exceeds this multiple of its size gets its own origin: floats would round its
-/// coordinates by up to 6e-5 of its size.
-constexpr double farSizes = 1000;
+constexpr double maxRounding = 1e-6;    // of coordinates, relative to the size of the mesh
 
 using IndexRange = tbb::blocked_range<std::size_t>;
 
@@ -70,7 +70,7 @@ VertexBounds boundsOf(const std::vector<glm::vec<3, Scalar>>& points, const std:
 glm::dvec3 originOf(const VertexBounds& bounds) {
     const glm::dvec3 size = bounds.upper - bounds.lower, far = glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper));
     const double side = std::max({size.x, size.y, size.z}), farthest = std::max({far.x, far.y, far.z});
-    if (!(side > 0) || !(farthest > farSizes * side) || !std::isfinite(farthest)) return glm::dvec3(0);
+    if (!isTooFarForFloats(farthest, side)) return glm::dvec3(0);
     const double step = std::exp2(std::ceil(std::log2(side)));
     return step * glm::round(0.5 * (bounds.lower + bounds.upper) / step);
 }
@@ -87,11 +87,29 @@ std::vector<glm::vec3> relativeTo(const glm::dvec3& origin, std::vector<glm::vec
     return moved;
 }
 
+/// A face whose triangles do not cover exactly what its outline encloses.
+struct UncoveredFace {
+    std::size_t index = 0;
+    double enclosedArea = 0, triangleArea = 0;  // the outline's; the sum of the triangles'
+
+    UncoveredFace() = default;
+    UncoveredFace(std::size_t face, const std::vector<glm::dvec3>& outline, std::span<const glm::uvec3> triangles)
+        : index(face) {
+        glm::dvec3 sum(0);
+        for (const glm::uvec3& t : triangles) {
+            const glm::dvec3 area = 0.5 * glm::cross(outline[t.y] - outline[t.x], outline[t.z] - outline[t.x]);
+            sum += area;
+            triangleArea += glm::length(area);
+        }
+        enclosedArea = glm::length(sum);
+    }
+};
+
 /// Triangles of some faces.
 struct FaceTriangles {
     std::vector<glm::uvec3> triangles;
-    std::size_t uncovered = 0;  // faces whose triangles do not cover exactly what their outline encloses
-    std::size_t firstUncovered = 0;
+    std::size_t uncovered = 0;  // count of uncovered faces
+    UncoveredFace firstUncovered;
 };
 
 /// Triangulates faces with any count of corners.
@@ -118,8 +136,9 @@ class FaceTriangulator {
         if (all.uncovered > 0)
             notes.push_back(fmt::format(
                 "the triangles of {} do not cover its outline, which crosses itself or encloses nothing; the "
-                "first is face {}, counted from 0",
-                counted(all.uncovered, "face", "faces"), all.firstUncovered));
+                "first is face {}, counted from 0: the outline has the area {:.6g}, the triangles {:.6g}",
+                counted(all.uncovered, "face", "faces"), all.firstUncovered.index, all.firstUncovered.enclosedArea,
+                all.firstUncovered.triangleArea));
         all.triangles.resize(begins.back());
         inOrder(results.size(), [&](std::size_t i) {
             std::copy(results[i].triangles.begin(), results[i].triangles.end(),
@@ -146,7 +165,8 @@ class FaceTriangulator {
             for (unsigned k = 0; k < polygons_.sizes[face]; ++k)
                 outline.push_back(glm::dvec3(polygons_.points[corners[k]]));
             const std::size_t first = result.triangles.size();
-            if (!triangulate(outline, result.triangles) && result.uncovered++ == 0) result.firstUncovered = face;
+            if (!triangulate(outline, result.triangles) && result.uncovered++ == 0)
+                result.firstUncovered = {face, outline, std::span(result.triangles).subspan(first)};
             for (std::size_t i = first; i < result.triangles.size(); ++i) {
                 glm::uvec3& t = result.triangles[i];
                 t = {corners[t.x], corners[t.y], corners[t.z]};
@@ -219,6 +239,10 @@ Mesh meshOf(PolygonsOf<Scalar> polygons, ReadReport& report) {
 }
 
 }  // namespace
+
+bool isTooFarForFloats(double farthest, double size) {
+    return size > 0 && std::isfinite(farthest) && farthest * floatRounding > maxRounding * size;
+}
 
 template <class Scalar>
 void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts) {

@@ -83,6 +83,15 @@ void takeFaces(Polygons& polygons, std::vector<Part>& parts) {
     setFaces(polygons, faces);
 }
 
+/// Largest relative error of a real number that is rounded to a float.
+inline constexpr double floatRounding = 0x1p-24;
+
+/// Returns whether floats may round coordinates of this magnitude by more than 1e-6 of the mesh's size. Such a mesh
+/// gets its own origin.
+/// @param farthest  largest magnitude of a coordinate [m]
+/// @param size      longest side of the mesh's bounding box [m]
+bool isTooFarForFloats(double farthest, double size);
+
 /// Triangulates polygons, moves a distant mesh to a local origin, welds it, and reports what was done with the file's
 /// contents. Throws std::runtime_error that names the file if no triangle is left, or if a face uses a vertex that does
 /// not exist. Throws std::invalid_argument if a coordinate that a face uses is not finite.

@@ -61,8 +61,9 @@ Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadR
             fmt::format("{}: has {}; a binary STL file has {} bytes at least, and a text one begins with 'solid'",
                         path.string(), counted(bytes.size(), "byte", "bytes"), binarySize(0)));
     if (bytes.size() < binarySize(count))
-        throw std::runtime_error(fmt::format("{}: ends early: of the {} triangles that it announces there are {}",
-                                             path.string(), count, (bytes.size() - binarySize(0)) / facetBytes));
+        throw std::runtime_error(
+            fmt::format("{}: ends early, after {} bytes: of the {} triangles that it announces there are {}",
+                        path.string(), bytes.size(), count, (bytes.size() - binarySize(0)) / facetBytes));
     PolygonsOf<float> polygons;
     if (const std::uint64_t more = bytes.size() - binarySize(count))
         polygons.notes.push_back(fmt::format("left out: {} after the last triangle", counted(more, "byte", "bytes")));

@@ -1,13 +1,14 @@
 #include "sdf/io/triangulate.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <utility>
 
 #include "sdf/base/line_side.h"
-#include "sdf/io/crossing_edges.h"
 #include "sdf/io/ear_clipper.h"
+#include "sdf/io/simple_outline.h"
 
 namespace bilayer::detail {
 namespace {
@@ -60,6 +61,11 @@ bool cutQuad(std::span<const glm::dvec3> outline, std::vector<glm::uvec3>& trian
     return false;
 }
 
+bool haveArea(std::span<const glm::dvec2> outline, std::span<const glm::uvec3> triangles) {
+    return std::any_of(triangles.begin(), triangles.end(),
+                       [&](const glm::uvec3& t) { return lineSide(outline[t.x], outline[t.y], outline[t.z]) > 0; });
+}
+
 bool cutPolygon(std::span<const glm::dvec3> outline, std::vector<glm::uvec3>& triangles) {
     thread_local std::vector<glm::dvec2> flat;
     thread_local EarClipper clipper;
@@ -68,10 +74,8 @@ bool cutPolygon(std::span<const glm::dvec3> outline, std::vector<glm::uvec3>& tr
     for (const glm::dvec3& point : outline) flat.push_back(view(point));
     const std::size_t before = triangles.size();
     const bool fits = clipper.clip(flat, triangles);
-    bool area = false;
-    for (std::size_t i = before; i < triangles.size() && !area; ++i)
-        area = lineSide(flat[triangles[i].x], flat[triangles[i].y], flat[triangles[i].z]) > 0;
-    return fits && area && (clipper.wasConvex() || !hasCrossingEdges(flat));
+    if (!fits || !haveArea(flat, std::span(triangles).subspan(before))) return false;
+    return clipper.wasConvex() || enclosesOnce(flat);
 }
 
 }  // namespace

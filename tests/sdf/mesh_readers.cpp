@@ -1,10 +1,13 @@
 // All readers: what they leave out and report, meshes far from the origin, errors, and damaged files.
 #include <fmt/format.h>
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>
 
+#include <bilayer/sdf/inspect.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "box_files.h"
 #include "demos/shared/shapes.h"
@@ -47,7 +50,8 @@ TEST_CASE("Omitted parts of a file are reported") {
     }
     // a bow tie
     report = readMeshFile(write("tie.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n")).report;
-    CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("the triangles of 1 face do not cover"));
+    CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")),
+               Contains("the triangles of 1 face do not cover") && Contains("area 0, the triangles 1"));
 }
 
 TEST_CASE("A mesh far from the origin keeps its shape") {
@@ -80,7 +84,67 @@ TEST_CASE("A mesh far from the origin keeps its shape") {
         }
     }
     // meshes near the origin have none
-    CHECK(readMesh(write("near.obj", objOfBox("v {} {} 100{}\n"))).origin == glm::dvec3(0));
+    CHECK(readMesh(write("near.obj", objOfBox("v {} {} 4{}\n"))).origin == glm::dvec3(0));
+}
+
+TEST_CASE("Coordinates lose no more than 1e-6 of the mesh's size, at any distance from the origin") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> logarithm(-1, 6), number(-1, 1);
+    const std::string off = offOfBox("OFF", "", ""), faces = objOfBox().substr(objOfBox().find('f'));
+    for (int i = 0; i < 300; ++i) {
+        const double size = std::exp2(8 * number(random)), distance = size * std::pow(10, logarithm(random));
+        const glm::dvec3 corner = distance * glm::dvec3(number(random), number(random), number(random));
+        CAPTURE(i, size, distance);
+        std::string obj, text = "OFF\n8 6 12\n";
+        for (const glm::dvec3& p : boxPoints) {
+            const glm::dvec3 q = corner + size * p;
+            obj += fmt::format("v {:.17g} {:.17g} {:.17g}\n", q.x, q.y, q.z);
+            text += fmt::format("{:.17g} {:.17g} {:.17g}\n", q.x, q.y, q.z);
+        }
+        for (const auto& path :
+             {write("box.obj", obj + faces), write("box.off", text + off.substr(off.find("4 0 3")))}) {
+            const Mesh mesh = readMesh(path);
+            REQUIRE(mesh.points.size() == boxPoints.size());
+            for (std::size_t k = 0; k < boxPoints.size(); ++k) {
+                const glm::dvec3 read = mesh.origin + glm::dvec3(mesh.points[k]);
+                const glm::dvec3 error = glm::abs(read - (corner + size * boxPoints[k]));
+                CHECK(std::max({error.x, error.y, error.z}) <= 1e-6 * 3 * size);
+            }
+            // two roundings of 3e-6 sizes for sides of 1, 2 and 3 sizes
+            const double error = mesh.origin == glm::dvec3(0) ? 6e-6 * (1 + 1 / 2.0 + 1 / 3.0) : 1e-6;
+            CHECK(inspect(mesh).volume == Approx(6 * size * size * size).epsilon(error));
+            if (distance < 10 * size) CHECK(mesh.origin == glm::dvec3(0));
+        }
+    }
+}
+
+TEST_CASE("Coordinates that the importer rounds by more than 1e-6 of the mesh's size are reported") {
+    const auto notes = [](double size, double shift, double nodeShift) {
+        std::string points;
+        for (const glm::dvec3& p : {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)})
+            points += fmt::format("{} {} {} ", shift + size * p.x, size * p.y, size * p.z);
+        const std::string dae = fmt::format(
+            "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+            "<library_geometries><geometry id=\"g\"><mesh><source id=\"p\"><float_array id=\"a\" count=\"12\">{}"
+            "</float_array><technique_common><accessor source=\"#a\" count=\"4\" stride=\"3\">"
+            "<param name=\"X\" type=\"float\"/><param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/>"
+            "</accessor></technique_common></source><vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/>"
+            "</vertices><triangles count=\"4\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>"
+            "<p>0 2 1 0 1 3 1 2 3 2 0 3</p></triangles></mesh></geometry></library_geometries><library_visual_scenes>"
+            "<visual_scene id=\"s\"><node><matrix>1 0 0 {} 0 1 0 0 0 0 1 0 0 0 0 1</matrix>"
+            "<instance_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes>"
+            "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>",
+            points, nodeShift);
+        return fmt::format("{}", fmt::join(readMeshFile(write("far.dae", dae)).report.notes, "\n"));
+    };
+    CHECK(notes(1, 0, 0).empty());
+    CHECK(notes(1, 8, 0).empty());
+    CHECK(notes(100, 1000, 0).empty());
+    CHECK_THAT(notes(1, 20, 0), Contains("single precision") && Contains("21 m from zero"));
+    CHECK_THAT(notes(0.01, 90, 0), Contains("90.01 m from zero by up to 5.4e-06 m"));
+    CHECK(notes(1, 0, 1000).empty());  // moved by its node
 }
 
 TEST_CASE("Errors of readers name the file, the position, the text there, and what is expected") {
@@ -106,14 +170,16 @@ TEST_CASE("Errors of readers name the file, the position, the text there, and wh
     fails("b.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\nthree 0 1 2\n", "line 6: 'three' stands where");
     fails("c.off", "OFF\n3 many\n", "line 2: 'many' stands where the number of faces should");
     fails("d.off", "OFF BINARY\n", "binary OFF is not read");
-    fails("e.off", "OFF\n999999999 5 0\n0 0 0\n", "the file ends before them");
+    fails("e.off", "OFF\n999999999 5 0\n0 0 0\n",
+          "line 4: the file ends after 1 of the 999999999 vertices that it announces");
     fails("f.off", "v 0 0 0\n", "stands where 'OFF' should");
     fails("a.ply", "ply\nformat ascii 2\n", "has no end_header");
     fails("b.ply", replaced(plyOfBox({}), "property float y\n", ""), "no property 'y'");
     fails("c.ply", replaced(plyOfBox({}), "float x", "real x"), "line 5: 'real' stands where a type");
     fails("d.ply", replaced(plyOfBox({}), "\n4 0 3 2 1", "\n4 0 3 2 11"), "face 0 refers to vertex 11");
     fails("e.ply", replaced(plyOfBox({}), "\n4 0 3 2 1", "\n4 0 3 2 x"), "'x' stands where an integer should");
-    fails("f.ply", replaced(plyOfBox({}), "element vertex 8", "element vertex 888888888888"), "ends before all");
+    fails("f.ply", replaced(plyOfBox({}), "element vertex 8", "element vertex 888888888888"),
+          "line 19: '2' stands where the end of the line should");
     fails("h.ply", replaced(plyOfBox({}), "\n1 2 3 \n", "\n1 2 3 7 \n"), "'7' stands where the end of the line should");
     fails("i.ply", replaced(plyOfBox({}), "\n1 2 3 \n", "\n1 nan 3 \n"),
           "vertex 6: its y is nan, which is no finite float");
@@ -125,7 +191,8 @@ TEST_CASE("Errors of readers name the file, the position, the text there, and wh
     fails("c.stl",
           "solid\n" + stlOfBox() + "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nendloop\nendfacet\nendsolid\n",
           "a facet has 1 vertices");
-    fails("d.stl", binaryStlOfBox("").substr(0, 300), "of the 12 triangles that it announces there are 4");
+    fails("d.stl", binaryStlOfBox("").substr(0, 300),
+          "after 300 bytes: of the 12 triangles that it announces there are 4");
     std::string infinite = binaryStlOfBox("");
     const float inf = std::numeric_limits<float>::infinity();
     std::memcpy(&infinite[84 + 7 * 50 + 12 + 20], &inf, sizeof inf);

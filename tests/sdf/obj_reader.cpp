@@ -16,7 +16,7 @@ TEST_CASE("OBJ: vertices may have three to eight numbers, in any way that number
          {"v {} {} {}\n", "v {} {} {} 1\n", "v {} {} {} 0.1 0.2 0.3\n", "v {} {} {} 1 0.1 0.2 0.3\n",
           "v {} {} {} 1 0.1 0.2 0.3 1\n", "v\t{}\t{}\t{}\t\n", "  v   {}  {} {}  \n", "v {}. {}.0 +{}\n",
           "v {}e0 {}E+00 {}.e-0\n", "v {} {} {} # corner\n", "v {} {} {}\r\n", "v {} {} {} nan nan nan\n",
-          "v \\\n {} {} \\\r\n {}\n", "\xef\xbb\xbfv {} {} {}\n"}) {
+          "v \\\n {} {} \\\r\n {}\n", "v {} \\ \n{}\\\t \r\n {}\\  \r\r\n", "\xef\xbb\xbfv {} {} {}\n"}) {
         CAPTURE(vertex);
         checkBox(write("box.obj", objOfBox(vertex)));
     }
@@ -42,7 +42,17 @@ TEST_CASE("OBJ: lines and files may be written in any way") {
     for (const bool little : {false, true})
         for (const bool mark : {false, true}) checkBox(write("wide.obj", utf16(text, little, mark)));
     checkBox(write("end.obj", text.substr(0, text.size() - 1)));
-    checkBox(write("joined.obj", replaced(text, " 4 ", " \\\n4 ")));
+    for (const char* joint : {"\\\n", "\\ \n", "\\\t \t\r\n", "\\ \r"}) {
+        CAPTURE(joint);
+        checkBox(write("joined.obj", replaced(text, " 4 ", fmt::format(" {}4 ", joint))));
+        checkBox(write("joined.obj", replaced(text, " ", joint)));
+        checkBox(write("joined.obj", replaced(text, " ", fmt::format("{} ", joint))));
+    }
+    CHECK_THROWS_WITH(readMesh(write("slash.obj", text + "f 1 2 \\ 3\n")), Catch::Contains("line 15: '\\'"));
+    // parts of a long text end between statements
+    std::string longer = text;
+    while (longer.size() < (1 << 19)) longer += "v 1 \\ \n 2 \\  \n 3\nf 1 2 \\ \n -1\n";
+    CHECK(readMeshFile(write("long.obj", longer)).report.notes.empty());
     checkBox(write("named.obj", "# drawn with c:\\\nmtllib c:\\\no box\ng a b\ns off\nusemtl x\\\n" + text));
     // faces first
     const std::size_t faces = text.find('f');

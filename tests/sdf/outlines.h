@@ -262,4 +262,16 @@ inline Outline withStraightCorners(const Outline& outline, std::mt19937& random)
     return result;
 }
 
+// Removes some of the corners where an outline goes straight on.
+inline Outline withoutStraightCorners(const Outline& outline, double kept, std::mt19937& random) {
+    Outline result;
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+        const std::size_t n = outline.size();
+        const Point &p = result.empty() ? outline[n - 1] : result.back(), &q = outline[i], &r = outline[(i + 1) % n];
+        const bool straight = sideOf(p, q, r) == 0 && (p.x - q.x) * (r.x - q.x) + (p.y - q.y) * (r.y - q.y) < 0;
+        if (!straight || std::uniform_real_distribution<double>(0, 1)(random) < kept) result.push_back(q);
+    }
+    return result;
+}
+
 }  // namespace bilayer::test

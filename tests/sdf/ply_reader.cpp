@@ -1,19 +1,25 @@
 // PLY files: every valid way to write them.
+#include <fmt/format.h>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <random>
 
 #include <bilayer/sdf/mesh_io.h>
 #include "box_files.h"
+#include "tests/support/support.h"
 
 using namespace bilayer;
 using namespace bilayer::test;
+using Catch::Contains;
 
 TEST_CASE("PLY: any format, types, order of elements, line ends, and data between") {
     for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"})
         for (const char* coordinate : {"float", "double", "float32", "float64", "int", "short", "uchar", "int8"})
             for (const auto& [count, index] :
-                 {std::pair("uchar", "int"), std::pair("int", "uint"), std::pair("uint8", "int32"),
-                  std::pair("ushort", "short"), std::pair("uint32", "uchar"), std::pair("char", "int8")})
+                 {std::pair("float", "double"), std::pair("double", "float"), std::pair("uchar", "int"),
+                  std::pair("int", "uint"), std::pair("uint8", "int32"), std::pair("ushort", "short"),
+                  std::pair("uint32", "uchar"), std::pair("char", "int8")})
                 for (const char* end : {"\n", "\r\n", "\r"})
                     for (const bool facesFirst : {false, true})
                         for (const bool more : {false, true}) {
@@ -36,6 +42,79 @@ TEST_CASE("PLY: data may begin with any byte, also with one that ends lines") {
             CHECK(mesh.triangles.size() == 12);
             CHECK(mesh.points[0].x == expected);
         }
+}
+
+TEST_CASE("PLY: reals in lists are whole numbers") {
+    for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"})
+        for (const char* bad : {"0.5", "nan", "1e300"}) {
+            CAPTURE(format, bad);
+            // the count of the first face, and its first corner
+            std::string counts = plyOfBox({.format = format, .count = "double"}), corners = counts;
+            corners = plyOfBox({.format = format, .index = "double"});
+            if (format == std::string("ascii")) {
+                counts = replaced(counts, "\n4 0 3 2 1", fmt::format("\n{} 0 3 2 1", bad));
+                corners = replaced(corners, "\n4 0 3 2 1", fmt::format("\n4 {} 3 2 1", bad));
+            } else {
+                double value = std::stod(bad);
+                if (format == std::string("binary_big_endian"))
+                    std::reverse(reinterpret_cast<char*>(&value), reinterpret_cast<char*>(&value + 1));
+                const std::size_t faces = 8 * 3 * sizeof(float) + 11;
+                std::memcpy(&counts[counts.find("end_header\n") + faces], &value, sizeof value);
+                std::memcpy(&corners[corners.find("end_header\n") + faces + 1], &value, sizeof value);
+            }
+            for (const std::string& text : {counts, corners})
+                CHECK_THROWS_WITH(readMesh(write("real.ply", text)),
+                                  Contains("real.ply: ") && Contains("face 0: its list 'vertex_indices' has ") &&
+                                      Contains("where a whole number should stand"));
+        }
+}
+
+TEST_CASE("PLY: words of a text may stand on any lines") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    for (const bool facesFirst : {false, true})
+        for (const bool more : {false, true})
+            for (int i = 0; i < 50; ++i) {
+                std::string text = plyOfBox({.facesFirst = facesFirst, .more = more});
+                for (std::size_t k = text.find("end_header\n") + 11; k < text.size(); ++k)
+                    if (text[k] == ' ' || text[k] == '\n') text[k] = random() % 5 ? ' ' : '\n';
+                CAPTURE(text);
+                checkBox(write("words.ply", text));
+            }
+    // a number more on each line of vertices is an error, not the first coordinate of the next one
+    CHECK_THROWS_WITH(readMesh(write("more.ply", replaced(plyOfBox({}), "3 \n", "3 9 \n"))),
+                      Contains("'9' stands where the end of the line should"));
+}
+
+TEST_CASE("PLY: an error at the end of the file says where, and how much is there") {
+    for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"})
+        for (const bool more : {false, true})
+            for (const bool facesFirst : {false, true}) {
+                const bool isText = format == std::string("ascii");
+                const std::string whole = plyOfBox({.format = format, .facesFirst = facesFirst, .more = more});
+                const std::size_t data = whole.find("end_header\n") + 11;
+                for (std::size_t size = data; size + 1 < whole.size() - (isText ? 5 : 0); size += 7) {
+                    const std::string text = whole.substr(0, size);
+                    CAPTURE(format, more, facesFirst, size);
+                    const auto place = isText ? fmt::format("line {}: ", 1 + std::count(text.begin(), text.end(), '\n'))
+                                              : fmt::format("byte {}: ", size);
+                    CHECK_THROWS_WITH(readMesh(write("short.ply", text)),
+                                      Contains("short.ply: " + place + "the file ends after ") &&
+                                          (Contains(" of the 8 elements 'vertex' that its header announces") ||
+                                           Contains(" of the 6 elements 'face' that its header announces") ||
+                                           Contains(" of the 1 elements 'camera' that its header announces")));
+                }
+            }
+    const std::string ply = plyOfBox({.format = "binary_little_endian"});
+    const std::size_t data = ply.find("end_header\n") + 11;
+    CHECK_THROWS_WITH(readMesh(write("short.ply", ply.substr(0, data + 5 * 12 + 3))), Contains("after 5 of the 8"));
+    CHECK_THROWS_WITH(readMesh(write("short.ply", ply.substr(0, data + 8 * 12 + 2 * 17))),
+                      Contains("after 2 of the 6"));
+    CHECK_THROWS_WITH(readMesh(write("short.ply", replaced(ply, "vertex 8", "vertex 888888888888"))),
+                      Contains("of the 888888888888 elements 'vertex'"));
+    const std::string text = plyOfBox({});
+    CHECK_THROWS_WITH(readMesh(write("short.ply", replaced(text, "face 6", "face 7"))), Contains("after 6 of the 7"));
 }
 
 TEST_CASE("PLY: strips of triangles are read, with breaks") {

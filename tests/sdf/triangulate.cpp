@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <bilayer/sdf/inspect.h>
+#include "lattice_walk.h"
 #include "outlines.h"
 #include "sdf/io/triangulate.h"
 #include "sdf/sign/sign_choice.h"
@@ -67,6 +68,21 @@ void check(Outline outline, std::mt19937& random, std::size_t flat = 0) {
     const std::size_t flatTriangles = checkAreas(outline, triangles);
     REQUIRE(flatTriangles == flat);
     REQUIRE(right);
+}
+
+// Checks that the triangles of an outline that touches itself cover it exactly, from whatever corner it begins and in
+// both directions.
+void checkTouching(Outline outline, std::mt19937& random) {
+    for (std::size_t i = 0; i < 2 * outline.size(); ++i) {
+        CAPTURE(i);
+        std::rotate(outline.begin(), outline.begin() + 1, outline.end());
+        if (i == outline.size()) std::reverse(outline.begin(), outline.end());
+        std::vector<glm::uvec3> triangles;
+        const bool right = triangulate(inSpace(outline, random), triangles);
+        checkEdges(outline.size(), triangles);
+        checkAreas(outline, triangles);
+        REQUIRE(right);
+    }
 }
 
 // Checks that an invalid outline is reported; its triangles still close the surface that they belong to.
@@ -199,6 +215,43 @@ TEST_CASE("repeated corners and edges out and back cost a triangle without area 
     check({{0, 0}, {4, 0}, {4, 4}, {6, 6}, {4, 4}, {0, 4}}, random, 2);
     check({{0, 0}, {4, 0}, {4, 4}, {3, 3}, {4, 4}, {0, 4}}, random, 0);
     check({{0, 0}, {4, 0}, {4, 2}, {2, 2}, {4, 2}, {6, 2}, {4, 2}, {4, 4}, {0, 4}}, random, 2);
+}
+
+TEST_CASE("outlines that touch themselves are cut exactly") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    checkTouching({{0, 0}, {4, 0}, {4, 2}, {2, 2}, {4, 4}, {0, 4}, {2, 2}, {0, 3}}, random);  // two notches
+    checkTouching({{0, 0}, {1, 0}, {1, 1}, {2, 1}, {2, 2}, {1, 2}, {1, 1}, {0, 1}}, random);  // two squares
+    checkTouching({{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}}, random);                          // a notch to an edge
+    checkTouching({{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 2}, {2, 1}}, random);          // a hole at a corner
+    for (int i = 0; i < 3000; ++i) {
+        CAPTURE(i);
+        const int size = 2 + i % 3, triangles = 2 + int(random() % unsigned(2 * size * size));
+        const int bothWays = i % 4 == 0 ? 1 + int(random() % 3) : 0;
+        const LatticeWalk walk(size, triangles, bothWays, random);
+        if (bothWays > 0 && !walk.isWhole()) continue;
+        Outline outline = withoutStraightCorners(walk.outline(), i % 3 * 0.5, random);
+        if (i % 5 == 0) outline.push_back(outline.back());
+        checkTouching(outline, random);
+    }
+}
+
+TEST_CASE("large outlines that touch themselves are cut exactly") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    for (int i = 0; i < 40; ++i) {
+        CAPTURE(i);
+        const int size = 10 << i % 4;
+        const Outline walk = LatticeWalk(size, size * size / (1 + i % 3), 0, random).outline();
+        const Outline outline = withoutStraightCorners(walk, i % 2 * 0.5, random);
+        std::vector<glm::uvec3> triangles;
+        const bool right = triangulate(inSpace(outline, random), triangles);
+        checkEdges(outline.size(), triangles);
+        checkAreas(outline, triangles);
+        REQUIRE(right);
+    }
 }
 
 TEST_CASE("outlines that cross themselves or enclose nothing are reported") {
