@@ -37,6 +37,9 @@ constexpr double clearVolume = 1e-6;
 /// Minimum work per task: triangles, or uses of edges or vertices.
 constexpr std::size_t grain = 4096;
 
+/// Phases that count for the progress: topology, hierarchy, components, intersections, orientation.
+constexpr std::size_t phases = 5;
+
 struct Component {
     double volume = 0;
     bool closed = true;
@@ -164,11 +167,11 @@ struct Measures {
 // Counts components with the wrong orientation. A component inside an even count of others should have positive volume,
 // a cavity inside an odd count negative volume.
 std::size_t countInsideOut(const Mesh& mesh, const TriangleTree& tree, std::vector<unsigned> of,
-                           const std::vector<Component>& all) {
+                           const std::vector<Component>& all, Progress& progress) {
     if (all.size() == 1) return all[0].closed && all[0].volume < 0;
     for (unsigned& component : of)
         if (!all[component].closed) component = noPart;
-    const auto enclosing = enclosingParts(mesh, tree, of, all.size());
+    const auto enclosing = enclosingParts(mesh, tree, of, all.size(), &progress);
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < all.size(); ++i)
         wrong += all[i].closed && (all[i].volume < 0) != (enclosing[i].size() % 2 == 1);
@@ -212,9 +215,10 @@ float commonThickness(const std::vector<float>& thickness, const Measures& measu
     return 0;
 }
 
-void findThinWalls(const TriangleTree& tree, const Measures& measures, float wall, MeshReport& report) {
+void findThinWalls(const TriangleTree& tree, const Measures& measures, float wall, MeshReport& report,
+                   Progress& progress) {
     if (!(report.bounds.longestSide() > 0)) return;
-    const std::vector<float> thickness = wallThickness(tree);
+    const std::vector<float> thickness = wallThickness(tree, &progress);
     report.thinnestWall = finiteOrZero(*std::min_element(thickness.begin(), thickness.end()));
     report.commonWall = commonThickness(thickness, measures, report.area);
     report.thinWalls =
@@ -223,8 +227,10 @@ void findThinWalls(const TriangleTree& tree, const Measures& measures, float wal
 
 }  // namespace
 
-MeshReport inspect(const Mesh& input, float wall) {
+MeshReport inspect(const Mesh& input, float wall, const std::function<bool(float)>& listener) {
     validate(input);
+    Progress progress(listener);
+    progress.begin(phases);
     MeshReport report;
     const std::optional<Mesh> welded = weldUnlessDone(input);
     const Mesh& mesh = welded ? *welded : input;
@@ -234,8 +240,10 @@ MeshReport inspect(const Mesh& input, float wall) {
     if (mesh.triangles.empty()) return report;
     report.bounds = bounds(mesh);
     report.origin = mesh.origin;
-    const Topology topology = Topology::ofWelded(mesh);
-    const TriangleTree tree(mesh);
+    const Topology topology = Topology::ofWelded(mesh, &progress);
+    progress.advance();
+    const TriangleTree tree(mesh, &progress);
+    progress.advance();
     const std::vector<unsigned> of = components(mesh, report.components);
     std::vector<Component> all(report.components);
     countEdges(topology, report);
@@ -254,10 +262,14 @@ MeshReport inspect(const Mesh& input, float wall) {
     }
     for (const Component& component : all) report.volume += component.volume;
     report.duplicateTriangles = countDuplicates(topology);
-    report.insideOutComponents = countInsideOut(mesh, tree, of, all);
-    report.selfIntersections = countIntersectingPairs(mesh, topology, tree);
-    if (!needsNoTurning(report, all)) report.flippedTriangles = orient(mesh).flippedTriangles;
-    findThinWalls(tree, measures, wall, report);
+    report.insideOutComponents = countInsideOut(mesh, tree, of, all, progress);
+    progress.advance();
+    report.selfIntersections = countIntersectingPairs(mesh, topology, tree, &progress);
+    progress.advance();
+    if (!needsNoTurning(report, all)) report.flippedTriangles = orient(mesh, &progress).flippedTriangles;
+    progress.advance();
+    findThinWalls(tree, measures, wall, report, progress);
+    progress.finish();
     return report;
 }
 

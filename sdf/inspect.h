@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 
 #include <bilayer/sdf/mesh.h>
@@ -40,9 +41,10 @@ struct MeshReport {
 };
 
 /// Examines a mesh in O(n log n). Vertices with equal coordinates count as one.
-/// @param wall  walls thinner than this count as thin [m], often one voxel; 0 counts none
-/// Throws as validate() does.
-MeshReport inspect(const Mesh& mesh, float wall = 0);
+/// @param wall      walls thinner than this count as thin [m], often one voxel; 0 counts none
+/// @param progress  as BuildOptions::progress; the fraction counts the phases that are done
+/// Throws as validate() does, and Cancelled.
+MeshReport inspect(const Mesh& mesh, float wall = 0, const std::function<bool(float)>& progress = {});
 
 /// Summarizes a report in one sentence without a full stop: "closed and oriented", or the defects, the most severe
 /// first.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
@@ -181,14 +182,22 @@ void check(const SolidOptions& options, const Transform& cells) {
         throw std::invalid_argument("solid: the half width must be in 3..1000 voxels");
 }
 
+// The progress of one of the two equal halves of the work; none if there is no listener.
+std::function<bool(float)> halfOf(const std::function<bool(float)>& progress, float begin) {
+    if (!progress) return {};
+    return [&progress, begin](float fraction) { return progress(begin + fraction / 2); };
+}
+
 template <class Body>
 Solid solidOf(const Body& body, const Placement& placement, const Transform& cells, const SolidOptions& options) {
     check(options, cells);
     const float voxel = float(cells.voxelSize()[0]);
     Solid solid;
-    solid.distance = regrid(body, placement, cells, options.halfWidthVoxels * voxel);
+    solid.distance = regrid(body, placement, cells, options.halfWidthVoxels * voxel, halfOf(options.progress, 0));
     solid.distance->setName("solid");
-    addFluidFractions(solid, *regrid(body, placement, *cornersOf(cells), minHalfWidth * voxel), cells);
+    const auto corners =
+        regrid(body, placement, *cornersOf(cells), minHalfWidth * voxel, halfOf(options.progress, 0.5f));
+    addFluidFractions(solid, *corners, cells);
     addVelocity(solid, options.velocity, placement.pose.position);
     return solid;
 }

@@ -3,6 +3,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <functional>
+
 #include <bilayer/integration/fluid/seed.h>
 #include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
@@ -28,6 +30,8 @@ struct Solid {
 struct SolidOptions {
     Velocity velocity{};
     float halfWidthVoxels = 3;  ///< half width of `distance` and `velocity`, at least 3
+    /// As BuildOptions::progress, of the distances at the cells' centres and corners.
+    std::function<bool(float)> progress{};
 };
 
 /// Computes the obstacle data of a body. Fluid fractions follow from the distances at the cells' corners, linear
@@ -37,7 +41,7 @@ struct SolidOptions {
 /// corners: there it closes no face.
 ///
 /// Active are the cells whose fluid fraction is below 1. Throws as regrid() does, for cells that are rotated against
-/// the world, for a velocity that is not finite, and for a half width out of 3..1000.
+/// the world, for a velocity that is not finite, and for a half width out of 3..1000; and Cancelled.
 Solid solid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& cells,
             const SolidOptions& options = {});
 Solid solid(const LevelSet& field, const Placement& placement, const openvdb::math::Transform& cells,

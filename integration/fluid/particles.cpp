@@ -15,6 +15,7 @@
 #include "collider/field/interpolant.h"
 #include "integration/fluid/detail/placement.h"
 #include "sdf/base/openvdb_points.h"
+#include "sdf/base/polled_loop.h"
 
 namespace bilayer::fluid {
 
@@ -98,7 +99,13 @@ void visitVoxel(const Coord& voxel, const ParticleOptions& options, Visit&& visi
 template <class Fill>
 Particles gather(const std::vector<Coord>& origins, const ParticleOptions& options, Fill&& fill) {
     std::vector<std::vector<glm::vec3>> parts(origins.size());
-    tbb::parallel_for(std::size_t(0), origins.size(), [&](std::size_t i) { fill(origins[i], parts[i]); });
+    Progress progress(options.progress);
+    progress.begin(origins.size());
+    forAllPolled(origins.size(), 1, nullptr, [&](std::size_t i) {
+        fill(origins[i], parts[i]);
+        progress.advance();
+    });
+    progress.finish();
     std::size_t count = 0;
     for (const auto& part : parts) count += part.size();
     Particles all;

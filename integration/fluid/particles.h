@@ -17,6 +17,8 @@ namespace bilayer::fluid {
 struct ParticleOptions {
     int perVoxel = 8;        ///< particles in a voxel that is entirely inside, in 1..1000
     std::uint64_t seed = 0;  ///< the same seed gives the same particles, for any number of threads
+    /// As BuildOptions::progress, of the blocks of 8^3 voxels.
+    std::function<bool(float)> progress{};
     /// The liquid's velocity at a point [m -> m/s], called from any thread; none: particles have no velocities.
     std::function<glm::vec3(const glm::vec3& point)> velocity{};
 };
@@ -27,7 +29,7 @@ struct Particles {
 };
 
 /// Creates particles at jittered positions inside a level set, none outside. Throws std::invalid_argument if the grid
-/// is no level set, its voxels are no cubes, or `perVoxel` is out of range.
+/// is no level set, its voxels are no cubes, or `perVoxel` is out of range; and Cancelled.
 Particles particles(const openvdb::FloatGrid& liquid, const ParticleOptions& options = {});
 
 /// Creates particles inside a body, in the voxels of a solver's grid. If the field has its mesh, no particle is on the

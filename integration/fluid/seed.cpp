@@ -89,13 +89,15 @@ SeedReport seedWith(FloatGrid& liquid, const FloatGrid::Ptr& band, SeedMode mode
 
 SeedReport seed(FloatGrid& liquid, const Mesh& mesh, const Placement& placement, const SeedOptions& options) {
     requireLiquid(liquid);
-    return seedWith(liquid, regrid(mesh, placement, liquid.transform(), liquid.background(), options.uniteSolids),
-                    options.mode);
+    return seedWith(
+        liquid, regrid(mesh, placement, liquid.transform(), liquid.background(), options.progress, options.uniteSolids),
+        options.mode);
 }
 
 SeedReport seed(FloatGrid& liquid, const LevelSet& field, const Placement& placement, const SeedOptions& options) {
     requireLiquid(liquid);
-    return seedWith(liquid, regrid(field, placement, liquid.transform(), liquid.background()), options.mode);
+    return seedWith(liquid, regrid(field, placement, liquid.transform(), liquid.background(), options.progress),
+                    options.mode);
 }
 
 }  // namespace bilayer::fluid

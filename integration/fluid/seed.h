@@ -4,6 +4,7 @@
 #include <openvdb/openvdb.h>
 
 #include <cstddef>
+#include <functional>
 #include <glm/vec3.hpp>
 
 #include <bilayer/collider/pose.h>
@@ -33,6 +34,8 @@ struct SeedOptions {
     /// Whether overlapping solids of the mesh are united: walls inside their union are then no surface
     /// (BuildOptions::unite).
     bool uniteSolids = true;
+    /// As BuildOptions::progress, of the body's distances.
+    std::function<bool(float)> progress{};
 
     SeedOptions(SeedMode how = SeedMode::unite, bool solids = true) : mode(how), uniteSolids(solids) {}
 };
@@ -55,7 +58,7 @@ struct SeedReport {
 ///
 /// Throws std::invalid_argument if the grid is no level set, its voxels are no cubes, or its band is narrower than 3
 /// voxels, and for everything that regrid() refuses. Throws std::runtime_error if no level set of this voxel size could
-/// be made. The grid is then unchanged.
+/// be made, and Cancelled. The grid is then unchanged.
 SeedReport seed(openvdb::FloatGrid& liquid, const Mesh& mesh, const Placement& placement = {},
                 const SeedOptions& options = {});
 

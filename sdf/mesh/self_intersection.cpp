@@ -105,11 +105,13 @@ class Pairs {
 
 }  // namespace
 
-std::size_t countIntersectingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree) {
+std::size_t countIntersectingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree,
+                                   Progress* progress) {
     const Pairs pairs(welded, topology);
     return tbb::parallel_reduce(
         tbb::blocked_range<std::uint32_t>(0, tree.boxes().leafCount, 64), std::size_t(0),
         [&](const auto& range, std::size_t count) {
+            poll(progress);
             std::vector<std::pair<unsigned, unsigned>> close;
             for (std::uint32_t leaf = range.begin(); leaf < range.end(); ++leaf) {
                 findClosePairs(welded, tree, leaf, close);

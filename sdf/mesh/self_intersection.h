@@ -14,6 +14,8 @@ namespace bilayer::detail {
 /// common, and if each surface continues on both sides of the other there, within the triangle or across an edge of it.
 /// Contact at points, contact along edges of both, and overlap within a plane do not count. The mesh must be welded, so
 /// that triangles share vertices by index. `topology` must be that of the mesh.
-std::size_t countIntersectingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree);
+/// @param progress  polled for cancellation, unless null
+std::size_t countIntersectingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree,
+                                   Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

@@ -91,8 +91,8 @@ std::vector<unsigned> originals(const Topology& topology) {
 
 Topology::Topology(const Mesh& mesh, Progress* asked) : Topology(mesh, firstOfEqual(mesh.points, asked), asked) {}
 
-Topology Topology::ofWelded(const Mesh& mesh) {
-    return Topology(mesh, {}, nullptr);
+Topology Topology::ofWelded(const Mesh& mesh, Progress* progress) {
+    return Topology(mesh, {}, progress);
 }
 
 Topology::Topology(const Mesh& mesh, const LargeArray<unsigned>& first, Progress* asked)

@@ -32,7 +32,7 @@ struct Topology {
     /// @param progress  kept; forEachEdge() polls it too
     explicit Topology(const Mesh& mesh, Progress* progress = nullptr);
     /// Builds the topology of a mesh that is already welded.
-    static Topology ofWelded(const Mesh& mesh);
+    static Topology ofWelded(const Mesh& mesh, Progress* progress = nullptr);
 
     std::vector<glm::uvec3> triangles;  ///< of the mesh, each vertex replaced by the first of equal coordinates
     LargeArray<EdgeUse> edges;          ///< sorted by (low, high, triangle); without triangles that use a vertex twice

@@ -16,6 +16,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "sdf/base/progress.h"
 #include "sdf/bvh/node_stack.h"
 #include "sdf/bvh/tree_lanes.h"
 
@@ -176,9 +177,10 @@ float thicknessBehind(const TriangleTree& tree, const Triangle& t) {
 
 }  // namespace
 
-std::vector<float> wallThickness(const TriangleTree& tree) {
+std::vector<float> wallThickness(const TriangleTree& tree, Progress* progress) {
     std::vector<float> thickness(tree.triangleCount());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.boxes().leafCount, 64), [&](const auto& range) {
+        poll(progress);
         for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf)
             for (std::size_t i = 0; i < tree.leafSize(leaf); ++i)
                 thickness[tree.leaf(leaf).triangles[i]] = thicknessBehind(tree, Triangle(tree.leaf(leaf), i));

@@ -12,6 +12,7 @@ namespace bilayer::detail {
 /// distance from the triangle's centre, against its normal, to the point where the ray exits through the front of the
 /// surface. It is infinite if the ray does not exit, or if it exits at a grazing angle (less than 12 degrees), as near
 /// an edge.
-std::vector<float> wallThickness(const TriangleTree& tree);
+/// @param progress  polled for cancellation, unless null
+std::vector<float> wallThickness(const TriangleTree& tree, Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

@@ -7,14 +7,17 @@
 #include <random>
 
 #include <bilayer/sdf/build.h>
+#include <bilayer/sdf/inspect.h>
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/bvh/wide_tree.h"
 #include "sdf/bvh/winding_number.h"
 #include "sdf/mesh/orient.h"
+#include "sdf/mesh/self_intersection.h"
 #include "sdf/mesh/side_classification.h"
 #include "sdf/mesh/topology.h"
+#include "sdf/mesh/wall_thickness.h"
 #include "sdf/sign/flood.h"
 #include "sdf/sign/sign_choice.h"
 #include "sdf/sign/winding.h"
@@ -133,6 +136,21 @@ TEST_CASE("everything that the choice of signs goes through can be cancelled") {
         checkCancelling("orient", 50, [&](Progress* p) { orient(*mesh, p); });
         checkCancelling("after a conflict", 100, [&](Progress* p) { chooseSignAfterConflict(*mesh, p); });
         checkCancelling("choice", mesh == &closed ? 2 : 100, [&](Progress* p) { chooseSign(*mesh, p); });
+    }
+}
+
+TEST_CASE("an inspection can be cancelled in each of its searches") {
+    const Mesh closed = knot(), loose = soup(4000);
+    for (const Mesh* mesh : {&closed, &loose}) {
+        const Topology topology = Topology::ofWelded(*mesh);
+        const TriangleTree tree(*mesh);
+        checkCancelling("intersections", 5, [&](Progress* p) { countIntersectingPairs(*mesh, topology, tree, p); });
+        checkCancelling("walls", 5, [&](Progress* p) { wallThickness(tree, p); });
+        std::vector<float> told;
+        inspect(*mesh, 0, [&](float fraction) { return told.push_back(fraction), true; });
+        CHECK(std::is_sorted(told.begin(), told.end()));
+        CHECK(told.back() == 1);
+        CHECK_THROWS_AS(inspect(*mesh, 0, [](float) { return false; }), Cancelled);
     }
 }
 

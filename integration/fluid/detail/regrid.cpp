@@ -20,6 +20,7 @@
 #include <bilayer/sdf/surface.h>
 #include "integration/fluid/detail/placement.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/base/progress.h"
 #include "sdf/sign/hole_width.h"
 #include "sdf/sign/sign_choice.h"
 
@@ -129,11 +130,11 @@ double roundedUp(double value) {
 
 // Refuses a mesh that bounds no volume, or has a hole too wide for the voxels. Depends on the mesh alone, not on the
 // positions of the voxels.
-void requireSolid(const Placed& body, const Transform& voxels) {
-    const SignChoice choice = chooseSignOfSolid(body.mesh);
+void requireSolid(const Placed& body, const Transform& voxels, Progress& progress) {
+    const SignChoice choice = chooseSignOfSolid(body.mesh, &progress);
     if (choice.sign == Sign::flood) refuseWithoutInside(choice.reason);
     if (choice.sign != Sign::winding) return;
-    const Hole hole = widestHole(choice.repaired ? *choice.repaired : body.mesh, maxHoleWidth);
+    const Hole hole = widestHole(choice.repaired ? *choice.repaired : body.mesh, maxHoleWidth, &progress);
     if (hole.width == 0) return;
     const double voxel = voxels.voxelSize()[0];
     const openvdb::Vec3d centre(hole.centre.x, hole.centre.y, hole.centre.z);
@@ -154,25 +155,28 @@ void requireInside(const FloatGrid& grid) {
 }
 
 FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transform& voxels, float width,
-                      bool uniteSolids) {
+                      const std::function<bool(float)>& progress, bool uniteSolids) {
     checkPlacement(placement);
     requireCubes(voxels);
     validate(mesh);
     const double voxel = voxels.voxelSize()[0];
     const float widthInVoxels = float(double(width) / voxel);
     const Placed placed = inVoxels(mesh, placement, voxels);
-    requireSolid(placed, voxels);
+    Progress choosing(progress);
+    requireSolid(placed, voxels, choosing);
     const LevelSet field = build(placed.mesh, {.voxelSize = 1,
                                                .exteriorWidthVoxels = widthInVoxels,
                                                .interiorWidthVoxels = widthInVoxels,
-                                               .unite = uniteSolids});
+                                               .unite = uniteSolids,
+                                               .progress = progress});
     if (field.sign() == byFlood) refuseWithoutInside(field.signReason());
     const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);
     grid->setTransform(voxels.copy());
     return grid;
 }
 
-FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const Transform& voxels, float width) {
+FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const Transform& voxels, float width,
+                      const std::function<bool(float)>& progress) {
     checkPlacement(placement);
     requireCubes(voxels);
     if (std::min(field.exteriorWidth(), field.interiorWidth()) < minFieldWidth * field.voxelSize() * (1 - rounding))
@@ -185,7 +189,7 @@ FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const T
     }
     const Mesh zeroSet = surface(field);
     if (zeroSet.triangles.empty()) throw std::invalid_argument("the field has no surface: it has no inside");
-    return regrid(zeroSet, placement, voxels, width, false);
+    return regrid(zeroSet, placement, voxels, width, progress, false);
 }
 
 }  // namespace bilayer::fluid::detail
