@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Shapes of bodies that collide with colliders: round bodies, boxes, convex hulls, planes and triangles.
 #pragma once
 

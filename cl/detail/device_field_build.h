@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Builds a field that stays on a device; kernels in field_build.cl.
 // Tested by tests/cl/field.cpp through DeviceField.
 #pragma once

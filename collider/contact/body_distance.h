@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Parts of the answers of distance().
 // Tested by tests/collider/distance.cpp and tests/collider/shape_distance.cpp.
 #pragma once

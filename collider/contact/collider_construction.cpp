@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Construction of colliders from meshes and from files.
 // Tested by tests/collider/collider.cpp through Collider.
 #include <bilayer/collider/collider.h>

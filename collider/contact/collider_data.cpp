@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The data of colliders that is made when it is first asked for. Programs that only ask link neither the construction
 // of colliders nor the reading of body files.
 #include "collider/contact/collider_data.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contact reduction: from hundreds of contacts to the few that a solver needs.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Convex bodies in closed form: signed distance, and the features to be tested against a field.
 // Tested by tests/bullet/convex.cpp and tests/collider/shapes.cpp.
 #pragma once

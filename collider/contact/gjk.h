@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance of two convex sets by their support points: the algorithm of Gilbert, Johnson and Keerthi ("A fast
 // procedure for computing the distance between complex objects in three-dimensional space", IEEE Journal on Robotics
 // and Automation 4 (1988) 193-203).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between a field and a half-space.
 // Tested by tests/bullet/pairs.cpp and tests/collider/shapes.cpp.
 #include <bilayer/collider/contact.h>

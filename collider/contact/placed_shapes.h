@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pairs of placed shapes, at least one of them a collider.
 // Tested by tests/collider/shapes.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between two shapes, one of them a collider.
 // Tested by tests/collider/shapes.cpp.
 #include <bilayer/collider/contact.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The data of a ContactShape.
 // Tested by tests/collider/shapes.cpp.
 #pragma once

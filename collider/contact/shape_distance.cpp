@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance between two shapes, one of them a collider.
 // Tested by tests/collider/shape_distance.cpp.
 #include <bilayer/collider/distance.h>

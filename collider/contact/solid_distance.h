@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance of a triangle mesh from convex solids and planes.
 // Tested by tests/collider/shape_distance.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between a field and the triangles of an open surface.
 // Tested by tests/bullet/open_surface.cpp through collideTriangles().
 #include <bilayer/collider/contact.h>

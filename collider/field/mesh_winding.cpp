@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The ray is parallel to an axis and leaves the mesh's box on the shortest way. The winding number sums its signed
 // crossings edge by edge, as J. O'Rourke ("Computational Geometry in C", 1998, 7.4) does for polygons. Highway compiles
 // the search once for each instruction set.

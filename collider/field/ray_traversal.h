@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The traversal of a mesh's tree along a ray, nearest nodes first. SIMD tests in single precision reject triangles
 // conservatively. Highway includes this file once for each instruction set: only between HWY_BEFORE_NAMESPACE's headers
 // and its own, after hwy/highway.h.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The tolerance of unit quaternions that users give.
 // Tested by tests/fluid/seed.cpp through seed().
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A build as a whole: options, threads, and the filling of a field by the methods that the options ask for.
 // Tested by tests/sdf/build.cpp and tests/sdf/rebuild.cpp through build().
 #pragma once

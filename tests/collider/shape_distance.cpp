@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Distances of shapes from colliders against brute force: the smallest distance over each triangle of a formula in
 // double precision.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between a collider and shapes of other kinds, and the convex hull of points.
 #include <bilayer/collider/shapes.h>
 

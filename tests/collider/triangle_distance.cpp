@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance of two triangles, one by one and in SIMD lanes, against brute force.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/collider/triangle_distance.cpp"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Each unit of a library, X.h and X.cpp, has tests: tests/LIBRARY/X.cpp, or the files that the comment at the top of
 // the unit names by a line "Tested by tests/....cpp." Such a file includes the header or uses a name that it declares.
 // A unit that only other units use says through which name the test reaches it: "Tested by tests/....cpp through

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Outlines that touch themselves, at random, with integer coordinates.
 #pragma once
 

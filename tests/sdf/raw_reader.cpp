@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // RAW files: triangles as lines of text, and what is wrong with a line.
 #include <fmt/format.h>
 #include <catch2/catch.hpp>

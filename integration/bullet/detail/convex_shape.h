@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bullet's convex shapes as convex bodies in closed form.
 // Tested by tests/bullet/convex.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bullet's meshes and height fields as sheets of triangles.
 // Tested by tests/bullet/sliding.cpp.
 #pragma once
