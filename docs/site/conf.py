@@ -7,8 +7,11 @@ docs/README.md; the pages of docs/reference/ get what the public headers declare
 import re
 import shutil
 from pathlib import Path
+from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[2]
+XML = ROOT / "build" / "docs" / "doxygen" / "xml"
+NAMESPACES = ("bilayer", "bilayer::bullet", "bilayer::fluid")
 
 project = "bilayer"
 copyright = "the authors of bilayer"
@@ -30,7 +33,7 @@ html_copy_source = False
 html_show_sphinx = False
 html_show_copyright = False
 
-breathe_projects = {"bilayer": str(ROOT / "build" / "docs" / "doxygen" / "xml")}
+breathe_projects = {"bilayer": str(XML)}
 breathe_default_project = "bilayer"
 breathe_default_members = ("members",)
 breathe_show_include = False
@@ -58,10 +61,33 @@ def contents():
                    for caption, pages in [("All pages", ["docs/README"]), *navigation()])
 
 
+def declared(xml):
+    """What Doxygen found in a header: directives of Breathe with the names of types, functions and constants, by place."""
+    for inner in xml.iter("innerclass"):
+        kind = "class" if inner.get("refid").startswith("class") else "struct"
+        detail = "::detail::" in inner.text or inner.get("prot") == "private"
+        if not detail and inner.text.rpartition("::")[0] in NAMESPACES:
+            place = ElementTree.parse(XML / f"{inner.get('refid')}.xml").find("compounddef/location").get("line")
+            yield int(place), f"doxygen{kind}", inner.text, ":members:\n"
+    for member in xml.iter("memberdef"):
+        name, kind = member.findtext("qualifiedname"), member.get("kind")
+        types = ["".join(parameter.find("type").itertext()) for parameter in member.iter("param")]
+        arguments = f"({', '.join(types)})" if kind == "function" else ""
+        yield int(member.find("location").get("line")), f"doxygen{kind}", name + arguments, ""
+
+
 def reference(folder):
-    """Directives for all public headers of a library."""
-    return "".join(f"\n## `{folder}/{header.name}`\n\n```{{doxygenfile}} {folder}/{header.name}\n```\n"
-                   for header in sorted((ROOT / folder).glob("*.h")))
+    """Directives for all public headers of a library, in the order of their declarations."""
+    for header in sorted((ROOT / folder).glob("*.h")):
+        yield f"\n## `{folder}/{header.name}`\n"
+        found = set()
+        for path in XML.glob("*.xml"):
+            compound = ElementTree.parse(path).find("compounddef")
+            if compound is None or compound.get("kind") != "file" or compound.find("location").get("file") != f"{folder}/{header.name}":
+                continue
+            found.update(declared(compound))
+        for _, directive, name, options in sorted(found):
+            yield f"\n```{{{directive}}} {name}\n{options}```\n"
 
 
 def add_to_page(app, name, source):
@@ -69,7 +95,7 @@ def add_to_page(app, name, source):
         source[0] += contents()
     folder = re.search(r"^<!-- reference of (\S+) -->$", source[0], re.M)
     if folder:
-        source[0] += reference(folder.group(1))
+        source[0] += "".join(reference(folder.group(1)))
 
 
 def add_index(app, error):

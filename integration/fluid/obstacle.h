@@ -25,8 +25,9 @@ struct Solid {
     openvdb::FloatGrid::Ptr openVolume;  ///< `open_volume`: fluid fraction of each cell, 0..1
 };
 
+/// Options of solid().
 struct SolidOptions {
-    Velocity velocity{};
+    Velocity velocity{};        ///< of the obstacle
     float halfWidthVoxels = 3;  ///< half width of `distance` and `velocity`, at least 3
 };
 
@@ -40,6 +41,7 @@ struct SolidOptions {
 /// the world, for a velocity that is not finite, and for a half width out of 3..1000.
 Solid solid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& cells,
             const SolidOptions& options = {});
+/// The same from a field.
 Solid solid(const LevelSet& field, const Placement& placement, const openvdb::math::Transform& cells,
             const SolidOptions& options = {});
 

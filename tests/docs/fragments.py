@@ -27,7 +27,7 @@ def fragments(source):
 def program(source):
     headers = sorted(path.relative_to(source) for folder in ("sdf", "collider", "cl", "integration/bullet", "integration/fluid")
                      for path in (source / folder).glob("*.h"))
-    includes, functions = [f"#include <bilayer/{header}>\n" for header in headers], []
+    includes, functions = ["#include <btBulletDynamicsCommon.h>\n", *(f"#include <bilayer/{header}>\n" for header in headers)], []
     for path, line, block in fragments(source):
         includes += INCLUDE.findall(block.text)
         body = INCLUDE.sub("\n", block.text)
