@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Builds the Python package with setuptools: the native module comes from CMake."""
 
 import os

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compares the accuracy of the builders. The fields are of all closed, oriented public meshes without
 // self-intersection. Hundreds of thousands of voxels each are compared with distances in double precision and winding
 // numbers that share no code with the library. Exit status 1 if the method under test is not exact.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory bandwidth of this machine and the memory traffic of samples: the lower bound of their time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A library of small meshes: `bilayer batch` on one core and on several, compared with a loop of single builds and with
 // GNU parallel.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which meshes with defects are usable as rigid bodies: drops each on five kinds of ground and prints the energy that
 // it gains, as a table in Markdown.
 #include <fmt/format.h>

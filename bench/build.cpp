@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compares the builders on the same mesh, voxel size and band, in one run. Prints each builder's median time on each
 // count of threads, its ratio to openvdb::tools::meshToVolume with flag 0x4 (exact distances) at the same half width,
 // its peak memory, and a summary.

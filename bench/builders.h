@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The builders and the meshes that the benchmarks compare: this project's and OpenVDB's builders, asked for the same
 // field.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Piles of bodies in Bullet: compares fields with the alternatives of its users, by speed, penetration and rest.
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Builds every mesh of the public corpus, clean or not, with automatic signs. Prints the result of inspect(), the sign
 // method and its reason, and the quality of the field. Exit status 1 if a build fails that should not.
 #include <fmt/format.h>

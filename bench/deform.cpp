@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A mesh that deforms from frame to frame. Compares frames per second of a full build per frame with those of an
 // incremental rebuild from the previous frame, where only a part of the mesh moves.
 #include <fmt/format.h>

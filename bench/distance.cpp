@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance of two bodies compared with FCL's, at several separations, for unrelated poses and along a motion.
 #include <bilayer/collider/distance.h>
 #include <bilayer/sdf/build.h>

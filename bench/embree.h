@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Embree on the triangles of a mesh: the exact peer for closest points and rays.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bench/fcl.h"
 
 #include <fcl/geometry/bvh/BVH_model.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance of two meshes by FCL (https://github.com/flexible-collision-library/fcl).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From mesh file to field file: compares whole commands in cold processes with the same by OpenVDB, and reading alone
 // with Assimp.
 #include <fmt/format.h>

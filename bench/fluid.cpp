@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Liquids seeded from meshes: compares the time with OpenVDB's meshToLevelSet and the code that a user must write
 // around it, and measures the error of volume and area.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Growth of build cost with the triangle count at one resolution, and with the resolution of one mesh. The meshes are
 // carved boxes, so that only their size changes. Each build runs in its own process.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Prints hashes of the fields of a folder of meshes, for every method and sign option. Two versions of the library with
 // the same output build the same fields.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Time, memory and the few statistics that the benchmarks print.
 //
 // The loops are plain, without a benchmark library: the results are ratios between builders on a shared machine.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compares OpenCL devices with TBB on the same mesh, voxel size and band, in one run. First each device's field is
 // compared with TBB's, which also compiles the kernels. Then the builders take turns. Last, separate builds read a
 // device's own clock and memory, so that profiling events do not slow the timed builds.

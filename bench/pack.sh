@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Packs the device tests, the OpenCL benchmark and the command line, as built, with every shared library that they need, so
 # that they run on a machine with an OpenCL driver and no packages: docs/opencl.md.
 set -euo pipefail

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Runs a packed program with the packed libraries, C library included, and an OpenCL driver of this machine:
 #
 #   ./run test_cl | bench_opencl | bilayer [ARGUMENTS]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Peers of the query benchmark: the field, OpenVDB, NanoVDB and Embree.
 //
 // All have the same interface: a batch of queries at a time, in world coordinates. A peer creates its own helpers (an

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A pile of bodies in Bullet. The bodies and their initial poses are the same for every rival.
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Python packages on the same mesh and points: bilayer, Open3D, OpenVDB's module, scipy's cKDTree.
 
 Times are the best of several runs. Errors and wrong signs are against brute force over all triangles in double

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compares queries on the same field in one run: the field, OpenVDB, NanoVDB and Embree. All answers are compared
 // first; then the peers take turns. Prints median nanoseconds per query next to the bound from the machine's memory
 // bandwidth.

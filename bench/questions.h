@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points and rays for queries, each in a random and in a coherent order.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Times peers that answer the same queries in turns.
 #pragma once
 

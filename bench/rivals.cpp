@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bench/rivals.h"
 
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>

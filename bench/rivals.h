@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Collision shapes that meshes may have in Bullet: our fields, and the alternatives of Bullet's users.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Errors of samples and closest points at random points of the band without its outermost voxel: values and directions
 // against ground truth. Five shapes, from 64 to 512 voxels.
 //

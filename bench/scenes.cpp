@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The rigid-body scenes of the demos, in sizes that run for minutes: step times on one thread and on all, and whether
 // their criteria are still met.
 #include <fmt/format.h>

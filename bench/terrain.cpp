@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A block slides without friction over wavy triangles: by its field, and by Bullet's own shapes.
 #include <BulletCollision/CollisionDispatch/btInternalEdgeUtility.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OpenCL devices: list them, open one, and report their errors.
 #pragma once
 

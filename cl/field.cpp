@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two batches of points alternate: while the device samples one, the other is uploaded or downloaded.
 #include <bilayer/cl/field.h>
 

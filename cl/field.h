@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A field on an OpenCL device, for sampling many points at once; kernel in field.cl.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Buffers hold the bodies of all queries, concatenated, and grow with new bodies.
 #include <bilayer/cl/point_sampler.h>
 #include <bilayer/collider/contact.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samples the points of bodies in the fields of other bodies on an OpenCL device, in one batch per step; kernel in
 // point_sampler.cl.
 // Tested by tests/bullet/sampled_pairs.cpp.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What the libraries in `bilayer_components` stand on. Read by the project itself and by its installed package.
 include(CMakeFindDependencyMacro)
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The text of FILE with the files that it includes in their places, each once.
 function(bilayer_included_text file seen result)
   get_filename_component(folder ${file} DIRECTORY)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # How the libraries of bilayer are built, included and installed.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)

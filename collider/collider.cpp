@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Construction of colliders from meshes and from files.
 #include <bilayer/collider/collider.h>
 #include <bilayer/sdf/build.h>

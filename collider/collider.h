@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The collision shape of a rigid body: a field, its mesh, and the data that contact generation needs.
 #pragma once
 

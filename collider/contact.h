@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contact generation between two posed bodies.
 // Tested by tests/collider/collide.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance between two posed bodies, and the time at which moving bodies touch.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Construction and properties of fields. Queries are in separate files.
 #include <bilayer/collider/field.h>
 

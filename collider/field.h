@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sampled distance fields: distance, gradient, closest point, ray and sphere casts. Built from a LevelSet, then
 // independent of OpenVDB.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Volume, centre and inertia as sums over tetrahedra, and the principal axes by Jacobi's rotations.
 #include <bilayer/collider/mass.h>
 

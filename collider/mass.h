@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Mass properties of the solid that a closed mesh or a field bounds.
 #pragma once
 

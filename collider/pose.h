@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Position and orientation of a rigid body.
 // Tested by tests/collider/collide.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Arguments and results of field queries.
 // Tested by tests/collider/field.cpp.
 #pragma once

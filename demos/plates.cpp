@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "demos/scenes/plates.h"
 
 #include "demos/shared/program.h"

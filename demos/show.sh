@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Plays a scene, then takes its picture with headless Chromium: show.sh NAME [OPTIONS of the program]. It exits with 3 if
 # a criterion is missed, as the program does.
 set -euo pipefail

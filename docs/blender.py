@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Renders the surface of a liquid, as `bilayer seed` writes it, as water:
 #   blender --background --factory-startup --python docs/blender.py -- FILE.vdb PICTURE.png [WIDTH SAMPLES]
 import math

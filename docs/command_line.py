@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """usage: command_line.py BILAYER: prints docs/command-line-options.md, from the --help of the program BILAYER."""
 
 import re

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Draws the pictures of docs/dirty.md: a mesh (backs of faces in orange, open edges in red), the surface of its field, and
 # a cut through the field with the mesh's own cut in red. Needs ./run bench corpus, and the packages chromium and
 # libjs-three. Arguments: names of pictures, by default all.

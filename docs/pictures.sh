@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Draws docs/slice.png: a cut through the double layer method's field of Debian's bunny, every pixel a `bilayer query`.
 # Needs ./run build, and the packages glmark2-data and chromium.
 set -euo pipefail

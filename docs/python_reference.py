@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """usage: python_reference.py: prints docs/python-reference.md, from the docstrings of the module."""
 
 import inspect

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The public functions of a build: options, threads, and whether the whole field is filled.
 #include <bilayer/sdf/build.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Builds a narrow-band signed distance field from a triangle mesh.
 //
 // Method: Y. Wu, J. Man, Z. Xie, "A double layer method for constructing signed distance fields from triangle meshes",

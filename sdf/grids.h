@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The OpenVDB grids of a LevelSet. Include this only where grids are accessed: it adds seconds of compile time.
 // Tested by tests/sdf/build.cpp.
 #pragma once

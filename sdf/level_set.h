@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A narrow-band signed distance field. grids.h gives access to its OpenVDB grids, whose headers are slow to compile.
 // Tested by tests/sdf/build.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The triangle mesh that fields are built from, and basic operations on it.
 #pragma once
 

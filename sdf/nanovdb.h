@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fields as NanoVDB grids: contiguous memory that GPU code reads without conversion.
 #pragma once
 

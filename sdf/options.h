@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Options for building a field.
 // Tested by tests/sdf/build.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads and writes fields as .vdb files, which Houdini, Blender and ParaView also open.
 #pragma once
 

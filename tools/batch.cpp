@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer batch`: a library of meshes becomes a folder of fields.
 #include <fmt/format.h>
 #include <sched.h>

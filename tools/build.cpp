@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer build`: a mesh file becomes a .vdb file.
 #include <fmt/format.h>
 #include <tbb/global_control.h>

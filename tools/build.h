@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The options of a build on the command line, and the steps of a build, for the commands that build fields.
 #pragma once
 

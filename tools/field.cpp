@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer query`, `surface` and `export`: field values as numbers, as a mesh, and as grids for a GPU.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer`: fields from meshes on the command line. Exit status 0: done; 1: input or machine at fault, one line on
 // stderr; 2: wrong usage.
 #include <cerrno>

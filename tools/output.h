@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Output of the commands: tables for people, JSON for programs, a progress bar on a terminal.
 #pragma once
 

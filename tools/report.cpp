@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer inspect`, `info` and `devices`: the read-only commands.
 #include <fmt/format.h>
 #include <openvdb/io/File.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer seed`: combines meshes and fields into one liquid level set, optionally with marker particles.
 #include <fmt/format.h>
 

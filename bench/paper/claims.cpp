@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The paper's proved claims and their limits: Theorems 1 and 2 at random, and thin walls.
 #include <fmt/format.h>
 #include <openvdb/tools/MeshToVolume.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The paper's program as published: dense grids, triangle by triangle, single-threaded. It is the reference of the
 // block-wise method in time and values.
 //

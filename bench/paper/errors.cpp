@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bench/paper/errors.h"
 
 #include <bilayer/sdf/grids.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The paper's pictures: the original next to the surface of its field.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // K, the neighbourhood of a sample: what it costs, and what it reaches.
 #include <fmt/format.h>
 #include <cmath>

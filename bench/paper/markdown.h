@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Formats tables and numbers for the page.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The paper's models and grids.
 //
 // Its grids of 72, 126, 251, 501 and 715 nodes along a side are 5 / 0.07, 5 / 0.04, 5 / 0.02, 5 / 0.01 and 5 / 0.007

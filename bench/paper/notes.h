@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Notes of rows where our time exceeds another's.
 #pragma once
 

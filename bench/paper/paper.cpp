@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reproduces the experiments of the double layer paper: measures parts by name, keeps each as JSON, and writes the
 // page.
 #include <fmt/format.h>

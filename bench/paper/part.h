@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A reproduced part of the paper: a table, a figure or a claim. Measuring produces JSON, which is kept between runs;
 // the page is written from the kept JSON.
 #pragma once

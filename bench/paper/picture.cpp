@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "bench/paper/picture.h"
 
 #include <openvdb/tools/RayTracer.h>

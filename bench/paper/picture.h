@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures of fields and of their source meshes by OpenVDB's ray tracer, with the same camera and shader. Ray hits on a
 // mesh use its triangles.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // All numbers that are taken from the paper, and nothing else. Y. Wu, J. Man, Z. Xie, "A double layer method for
 // constructing signed distance fields from triangle meshes", Graphical Models 76 (2014) 214-223. In the paper K is 1024
 // triangles.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The fields of the serial program and of the block-wise method are the same.
 #include <fmt/format.h>
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // AWPN, the method that the paper uses as ground truth and as its rival on one core. A serial program of the same kind:
 // a dense grid, triangle by triangle. J. A. Baerentzen, H. Aanaes, "Signed distance computation using the angle
 // weighted pseudonormal", IEEE Transactions on Visualization and Computer Graphics 11 (2005) 243-253, the paper's [33].

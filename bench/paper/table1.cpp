@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Table 1: errors of the double layer method.
 #include <fmt/format.h>
 #include <algorithm>

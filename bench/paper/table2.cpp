@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Table 2: build times on one core.
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Table 3: build times on OpenCL devices.
 #include <fmt/format.h>
 #include <fmt/ranges.h>

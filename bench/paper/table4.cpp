@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Table 4: build times and memory of growing grids.
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Table 5: build times of triangles of unlike areas.
 #include <fmt/format.h>
 #include <fmt/ranges.h>

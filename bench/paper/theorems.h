@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Theorems 1 and 2 of the paper at random triangles and wedges. Each function runs `trials` trials and returns the
 // worst result.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Timing of builders for the paper's tables: on threads, in turns, and on OpenCL devices.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The device memory of a batch of bricks: its size, its buffers, and the layout of its results.
 // Tested by tests/cl/filler.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Divides the bricks of a grid into batches that fit the device's memory.
 // Tested by tests/cl/filler.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bins the triangles of a mesh by brick on a device; kernels in bins.cl.
 // Tested by tests/cl/filler.cpp.
 #pragma once

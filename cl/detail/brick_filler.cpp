@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two batches of bricks alternate, each in its own queue: while the device fills one, the host receives the blocks of
 // the other.
 #include "cl/detail/brick_filler.h"

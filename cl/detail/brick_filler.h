@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The methods that fill brick by brick on a device. Triangles are binned into bricks and cut into parts, and blocks are
 // filled from the parts. Bricks stream through the device's memory in batches.
 // Tested by tests/cl/filler.cpp.

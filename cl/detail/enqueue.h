@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Enqueues kernels by name.
 // Tested by tests/cl/filler.cpp.
 #pragma once

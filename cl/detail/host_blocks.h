@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blocks that a device leaves to the host.
 // Tested by tests/cl/filler.cpp.
 #pragma once

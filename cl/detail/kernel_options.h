@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Translates the options of a filler or a field for a device, and holds the constants of all kernels.
 // Tested by tests/cl/filler.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A device buffer that the host reads in place.
 // Tested by tests/cl/filler.cpp.
 #pragma once

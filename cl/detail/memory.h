@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Device memory within a budget.
 // Tested by tests/cl/field.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blocks stream through the device in batches of whole bricks. Two batches alternate: while the device fills one, the
 // host makes the prisms of the next and passes on the previous one.
 #include "cl/detail/prism.h"

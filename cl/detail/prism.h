@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The prism method on an OpenCL device; kernels in prism.cl, host side in prism_bins.h.
 #pragma once
 

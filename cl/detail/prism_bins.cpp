@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cl/detail/prism_bins.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Builds the prisms around triangles and bins them by the blocks that they reach: the host side of the prism method.
 //
 // C. Sigg, R. Peikert, M. Gross, "Signed distance transform using graphics hardware", IEEE Visualization 2003. The

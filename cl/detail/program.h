@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The implementation of Device, for the files of this folder and their tests: OpenCL objects, compiled programs, error
 // texts.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Waits for the commands of a queue at the end of a scope.
 // Tested by tests/cl/filler.cpp.
 #pragma once

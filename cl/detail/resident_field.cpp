@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Each batch of blocks that the fill leaves on the device is trimmed to the band at once, into a page of its own. After
 // the last batch, when their number is known, the pages are copied into the layout.
 #include "cl/detail/resident_field.h"

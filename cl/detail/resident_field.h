@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Builds a field that stays on a device; kernels in resident.cl.
 // Tested by tests/cl/field.cpp.
 #pragma once

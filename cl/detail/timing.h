@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Measures device time by the events of queues.
 // Tested by tests/cl/filler.cpp.
 #pragma once

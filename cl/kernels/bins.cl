@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bins triangles by the bricks that they reach, by count, scan and scatter: sdf/fill/triangle_bins.h on a device. A
 // program that includes this file defines the parts that a triangle is cut into.
 #include "vectors.cl"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The side of a voxel by the angle-weighted normal of its closest feature: sdf/sign/closest_side.h on a device, in
 // double precision.
 #include "piece_distances.cl"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Code of all kernels: division of work over work-items, vectors of voxels, the mesh. A block is a leaf of 8^3 voxels.
 //
 // Two mappings of work to work-items, chosen when a program is built:

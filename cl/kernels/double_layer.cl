@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The double layer method on a device: the samples of sdf/fill/layer_samples.h, applied as in sdf/fill/layer_block.cpp.
 //
 // -D TRIANGLES=1 also stores the triangle of the nearest sample. -D PAPER_CUBE=1 replaces the ball around a sample by

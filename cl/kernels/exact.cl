@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The exact method on a device: sdf/fill/exact.cpp, with the same pieces, bounds, sign propagation and closest
 // features. Blocks whose sides the nearest triangles leave open are listed and left to the host.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samples a field that is laid out as in collider/field/field_layout.h. Does the same operations as
 // collider/field/field_sample.cpp.
 #include "layout.cl"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sorts the members of a brick by cells of space into groups that a block can test or cull as a whole.
 #include "bins.cl"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The signed distances of a cube of voxels, from the samples in the cells around it: sdf/fill/layer_block.cpp on a
 // device.
 #include "layer_points.cl"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The points of the two layers around samples: those that reach the voxels of a cube are selected, and the nearest one
 // of each voxel is found.
 #include "samples.cl"

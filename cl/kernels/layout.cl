@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A field laid out on a device, as in collider/field/field_layout.h.
 #include "common.cl"
 

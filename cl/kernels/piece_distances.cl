@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distances of a block's voxels to the pieces that reach it, and the sides over faces: sdf/fill/exact_block.h on a
 // device.
 #include "pieces.cl"

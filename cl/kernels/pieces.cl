@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cuts triangles into pieces of about a voxel, and groups pieces into clusters, brick by brick: sdf/fill/pieces.h and
 // sdf/fill/clusters.h on a device.
 #include "groups.cl"

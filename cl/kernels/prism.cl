@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The prism method on a device: C. Sigg, R. Peikert, M. Gross, "Signed distance transform using graphics hardware",
 // IEEE Visualization 2003. A voxel inside the prisms of several triangles gets the signed distance with the smallest
 // absolute value. Rows of voxels are scanned against the five planes of a prism.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lays out the blocks that a filler has left on the device. Produces the same numbers as trimToBand(), Assembler and
 // FieldLayout on the host.
 #include "layout.cl"

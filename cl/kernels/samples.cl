@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The samples of the double layer method in a brick. The parts of triangles are sampled, and the samples are sorted by
 // cells of space: sdf/fill/layer_samples.h on a device.
 #include "tile_cutter.cl"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The sides of a block's voxels: known ones are propagated over links, and each group of linked voxels without a side
 // asks the closest feature: sdf/leaf/sign_propagation.h on a device.
 #include "closest_side.cl"

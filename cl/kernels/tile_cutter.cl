@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cuts triangles into the parts that Algorithm 1 of the paper samples without gaps: sdf/fill/tile_cutter.h on a device.
 #include "bins.cl"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Processes triangles in batches: as many at once as there are lanes if one item does a group's work, else one by one.
 #include "common.cl"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Storage of bodies: metadata of the distance grid, and their surface points and mesh (stored_points.h, stored_mesh.h).
 #include "collider/contact/body.h"
 

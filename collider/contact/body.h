@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The contact data of a rigid body, apart from its field. Built once from the mesh, it can be stored with the field's
 // grids in their .vdb file. The mesh file is then not needed again.
 #pragma once

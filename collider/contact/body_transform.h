@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The transform from the coordinates of one body into those of another.
 // Tested by tests/collider/collide.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Refinement of contacts to the closest points of two surfaces.
 // Tested by tests/collider/collide.cpp.
 #pragma once

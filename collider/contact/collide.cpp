@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between two bodies: the surface points of either body in the field of the other.
 #include <bilayer/collider/contact.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The data of a Collider.
 // Tested by tests/collider/collider.cpp.
 #pragma once

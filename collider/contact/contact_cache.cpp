@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "collider/contact/contact_cache.h"
 
 #include <bilayer/collider/contact.h>

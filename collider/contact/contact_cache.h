@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The data that the contact search of a pair of bodies keeps between steps.
 #pragma once
 

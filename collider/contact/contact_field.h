@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The field of the other body of a pair, as the contact search queries it.
 // Tested by tests/collider/collide.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the deepest point of an edge in another body, and the contact there.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts of a body's sharp edges between its surface points, in the field of another body.
 // Tested by tests/collider/sharp_edges.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "collider/contact/interpolation_error.h"
 
 #include "collider/field/field_data.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where a field's samples are inaccurate: at edges, in grooves, and wherever the surface bends within a voxel.
 #pragma once
 

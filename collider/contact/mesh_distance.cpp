@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Branch and bound over pairs of nodes, nearest pair first, as E. Larsen, S. Gottschalk, M. Lin, D. Manocha, "Fast
 // distance queries with rectangular swept sphere volumes", ICRA 2000. Oriented boxes replace their swept rectangles:
 // pieces of surfaces that face each other are flat in them, so that their bounds are tight. Highway compiles it once

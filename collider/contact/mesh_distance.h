@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance between two triangle meshes.
 // Tested by tests/collider/distance.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The relative motion of two bodies.
 // Tested by tests/collider/collide.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The filter of contacts by their normals, and the test for points that only graze a surface. They suppress ghost
 // collisions with edges between faces.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The search for contacts of one body's surface points in the field of another body. The point hierarchy is traversed
 // with the relative pose, so that only points near the other body are sampled.
 // Tested by tests/collider/collide.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The hierarchy of a mesh placed in a frame that it shares with another mesh.
 // Tested by tests/collider/distance.cpp.
 #pragma once

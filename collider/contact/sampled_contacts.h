@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts from the results of a PointSampler.
 // Tested by tests/bullet/sampled_pairs.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Batch sampling of the points of many bodies in each other's fields, as a device can do it. A sampler is a function
 // object that its user calls, as a BlockFiller is.
 // Tested by tests/bullet/sampled_pairs.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "collider/contact/sharp_edges.h"
 
 #include <tbb/parallel_for.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The sharp edges of a body as segments between neighbouring surface points. Edge-edge contacts mostly lie between the
 // points.
 #pragma once

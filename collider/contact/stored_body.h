@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Conversions and checks that the parts of a stored body share.
 // Tested by tests/collider/body.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "collider/contact/stored_mesh.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Storage of a body's mesh as a metadata entry of the distance grid.
 // Tested by tests/collider/body.cpp.
 #pragma once

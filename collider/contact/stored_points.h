@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Storage of a body's surface points as a grid of OpenVDB points.
 // Tested by tests/collider/body.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sampling of surface points. Candidates are the vertices, and a lattice on edges and faces that are larger than the
 // spacing. They are thinned out in order of decreasing convexity, so that the points that touch first remain.
 #include "collider/contact/surface_points.h"

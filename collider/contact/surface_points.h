@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points on a body's surface in a bounding sphere hierarchy. They are tested against another body's field.
 #pragma once
 

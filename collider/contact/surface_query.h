@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The result of a point query on a field's surface, for contacts.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Segments as in C. Ericson, "Real-Time Collision Detection", 2005, section 5.1.9. Two triangles are closest at two of
 // their edges, at a corner and a face, or where they intersect.
 #include "collider/contact/triangle_distance.h"

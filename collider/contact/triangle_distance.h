@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The closest points of two triangles.
 // Tested by tests/collider/distance.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The squared distances from one triangle to several, one in each SIMD lane. Highway includes this file once for each
 // instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
 // Tested by tests/collider/distance.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks of batch queries.
 // Tested by tests/collider/field.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Entry points of closest-point searches in the band. A cube is a stored block, or a group of blocks where triangles
 // are large compared with voxels. For each cube, the entries hold the hierarchy's nodes within the band's reach; they
 // are leaves where those are few enough. Searches thus skip the levels above, and the field's distances.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Separating axes reject most boxes of the tree. Highway compiles the search once for each instruction set.
 #include "collider/field/box_overlaps.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Overlaps of boxes with the triangles of a mesh. SIMD tests in single precision reject triangles conservatively;
 // double precision and the mesh's own vertices decide (triangle_tests.h). May run on any number of threads at once, and
 // allocates nothing.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A coarse distance bound for places far from a field's surface.
 // Tested by tests/collider/field_rays.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An exact distance transform of the coarse cells that the surface may meet.
 #include "collider/field/coarse_distance.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distances of a field's coarse cells to the surface, for Clearance.
 // Tested by tests/collider/field.cpp.
 #pragma once

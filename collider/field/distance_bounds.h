@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lower bounds of the distance to a field's surface where samples are outside the band. Negative inside. Points are in
 // voxels from the directory's first voxel, bounds in metres. Highway includes this file once for each instruction set:
 // only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h. The functions round down, which most

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The pseudonormals of a mesh's edges and vertices: J. A. Baerentzen, H. Aanaes, "Signed distance computation using the
 // angle weighted pseudonormal", IEEE TVCG 11 (2005) 243-253. Vertices with equal coordinates count as one. Duplicate
 // triangles count once, and triangles without area are ignored.

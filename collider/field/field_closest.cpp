@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Closest-point queries on a mesh with a field. The point's block holds the hierarchy nodes to search. The distance to
 // the closest feature is then computed in double precision.
 #include <hwy/cache_control.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The data of a Field, and its access by queries.
 // Tested by tests/collider/field.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Construction of field layouts.
 #include "collider/field/field_layout.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A level set laid out for queries. Each leaf becomes a block of 9^3 floats, so that the eight voxels around any point
 // are in one block. A dense directory over the blocks' bounding box holds the block of each place, or the side that it
 // is on.

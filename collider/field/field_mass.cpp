@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Mass properties of a field's interior. Voxels are cubes; where the sign changes, the negative part of the cell
 // between eight voxel centres replaces their parts in it.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Inside tests and overlaps of spheres and boxes, and the batch versions of all queries.
 #include <algorithm>
 #include <cmath>

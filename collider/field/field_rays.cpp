@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ray and sphere casts: against the triangles if there is a mesh, otherwise against the zero set of the interpolant.
 #include <algorithm>
 #include <cmath>

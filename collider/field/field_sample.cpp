@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Field sampling, single and in batches. cl/kernels/field.cl samples in the same way, operation by operation. Voxels
 // outside the band are NaN, which propagates to the result. Highway compiles the part between HWY_BEFORE_NAMESPACE and
 // HWY_AFTER_NAMESPACE once for each instruction set. All of them give the same bytes.

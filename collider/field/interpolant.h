@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Error bounds of a field's interpolated distances; internal.
 // Tested by tests/collider/zero_set.cpp.
 #pragma once

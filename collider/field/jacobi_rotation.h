@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A step of C. G. J. Jacobi's method for the eigenvectors of a symmetric matrix.
 // Tested by tests/collider/mass.cpp.
 #pragma once

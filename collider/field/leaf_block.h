@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blocks of 9^3 distances: an OpenVDB leaf, and the first layer of voxels of its seven upper neighbours.
 // Tested by tests/collider/field.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Closest-triangle search by branch and bound, nearest box first: N. Roussopoulos, S. Kelley, F. Vincent, "Nearest
 // neighbor queries", SIGMOD 1995, 71-79. Highway compiles it once for each instruction set.
 // Tested by tests/collider/field_closest.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Nodes are visited in front-to-back order. Highway compiles the search once for each instruction set.
 #include "collider/field/mesh_rays.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ray casts against the triangles of a mesh. SIMD tests in single precision reject triangles conservatively; double
 // precision and the mesh's own vertices decide (triangle_tests.h). Lengths in metres. May run on any number of threads
 // at once, and allocates nothing.

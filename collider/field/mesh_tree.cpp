@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Construction of mesh trees, and the closest features of triangles in double precision.
 #include "collider/field/mesh_tree.h"
 

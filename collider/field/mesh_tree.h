@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A mesh with a bounding volume hierarchy over its triangles, for exact queries. The closest-triangle search is in
 // mesh_nearest.cpp.
 // Tested by tests/collider/mesh_rays.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Volume integrals that mass properties are computed from, for meshes and fields.
 // Tested by tests/collider/mass.cpp.
 #pragma once

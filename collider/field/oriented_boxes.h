@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Oriented bounding boxes of a WideTree's nodes. The boxes of a group share a frame that is rotated along the normals
 // of its triangles. Pieces of a smooth surface are flat in such boxes, so the distance bounds are tight. Axis-aligned
 // boxes of slanted pieces are loose, and searches would open them in vain. After S. Gottschalk, M. C. Lin, D. Manocha,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Straight paths in double precision; internal.
 // Tested by tests/collider/field_rays.cpp.
 #pragma once

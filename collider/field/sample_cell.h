@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The eight voxels around a place, and their trilinear interpolation in two vectors of four: along x first, then y,
 // then z. The gradient is a by-product. Highway includes this file once for each instruction set: only between
 // HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Places in a field as fixed-point numbers. The upper word of a number is the block; its lower word is the voxel in the
 // block and the fraction to the next voxel. Highway includes this file once for each instruction set: only between
 // HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The vectors of field samples, in the compiler's own types, with loads, conversions and shuffles. Highway includes
 // this file once for each instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after
 // hwy/highway.h.

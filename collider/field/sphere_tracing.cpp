@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The triangles near a short path are found by branch and bound. Highway compiles the search once for each instruction
 // set.
 #include "collider/field/sphere_tracing.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sphere casts against a mesh; internal. Empty space is crossed by sphere tracing (J. C. Hart, "Sphere tracing", The
 // Visual Computer 12 (1996) 527-545). Near the mesh, each section of the path is tested against the triangles exactly.
 // A sphere that grazes the surface thus takes no more steps than there are sections.

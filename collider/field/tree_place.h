@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Places in the frame of a mesh's tree, and their distances to the triangles of its leaves. Highway includes this file
 // once for each instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
 // Tested by tests/collider/mesh_rays.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "collider/field/triangle_tests.h"
 
 #include <algorithm>

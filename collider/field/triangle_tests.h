@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tests of single triangles against rays, swept spheres and boxes in double precision; internal.
 // Tested by tests/collider/mesh_rays.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The cells of a field's interpolant, as the queries of its zero set read them. Lengths in voxels, places from the
 // directory's first voxel.
 // Tested by tests/collider/zero_set.cpp.

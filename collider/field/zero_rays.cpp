@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The first crossing of a path into the zero set. Paths are walked from cell to cell (J. Amanatides, A. Woo, "A fast
 // voxel traversal algorithm for ray tracing", Eurographics 1987, 3-10). Along a path the interpolant of a cell is a
 // cubic, monotone between its extrema (H. Hansson-Soederlund, A. Evans, T. Akenine-Moeller, "Ray tracing of signed

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Branch and bound over the zero set of a field's interpolant: over the cubes of the directory, most of which are
 // rejected by their clearances, then cells, then their octants. Lengths in voxels, places from the directory's first
 // voxel.

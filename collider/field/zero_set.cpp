@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Queries of the zero set by branch and bound.
 #include "collider/field/zero_set.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The surface of a field without a mesh: the zero set of the trilinear interpolant. Lengths in voxels, places from the
 // directory's first voxel. A cell whose eight values have one sign contains no surface. A cell with both signs has
 // surface on its edges. Both hold for sub-cells too, so results are certain up to the size of the smallest sub-cells.

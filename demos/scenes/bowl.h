@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies of any shape fall into a bowl and come to rest in a pile: the complete path from a mesh to bodies in Bullet.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A chain of linked rings with a heavy ring at its end. Contacts alone carry the load: one missed contact lets the rest
 // fall. After Z. Ferguson and others, "Intersection-free rigid body dynamics", ACM TOG 40 (2021).
 #pragma once

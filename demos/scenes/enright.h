@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The standard deformation test for level sets: a deformation flow stretches a body into a thin film and, reversed,
 // restores it. After R. J. LeVeque, "High-resolution conservative algorithms for advection in incompressible flow",
 // SIAM J. Numer. Anal. 33 (1996), and D. Enright, R. Fedkiw, J. Ferziger, I. Mitchell, "A hybrid particle level set

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A train of spur gears, the first one driven, the last one braked. Teeth that mesh by contact alone must maintain the
 // gear ratio.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blocks on inclines, each with a different friction: the shortest scene, and the one to copy. After E. Guendelman, R.
 // Bridson, R. Fedkiw, "Nonconvex rigid bodies with stacking", ACM TOG 22 (2003). Theory predicts which blocks stick and
 // how fast the others slide.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A liquid bunny falls into a tank, around a solid knot that rotates. fluid::seed turns one mesh into liquid,
 // fluid::solid turns another into an obstacle, and OpenVDB's tools do the rest (shared/water.h).
 #pragma once

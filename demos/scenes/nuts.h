@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Nuts run down their bolts under gravity or a multiple of it. One revolution must advance a nut by one pitch, and
 // friction that holds the nut in theory must hold it here. After Y. Narang and others, "Factory: fast contact for
 // robotic assembly", RSS 2022.

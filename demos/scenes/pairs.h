@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pairs of every Bullet shape and a field, one resting on the other. Fields of a box, a ball and a ring, and a field
 // scaled by Bullet, rest on each shape that has a flat top. Each shape rests on a field. The pairs cover both orders of
 // creation, and static, kinematic and dynamic lower bodies.

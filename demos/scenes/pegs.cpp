@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "demos/scenes/pegs.h"
 
 #include <BulletCollision/CollisionShapes/btBoxShape.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pegs fall into holes that are only slightly wider than they are. Each peg is dropped off-centre and tilted, and must
 // slide over the chamfers down to the floor.
 #pragma once

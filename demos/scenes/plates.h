@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Balls shot at thin plates at 60 steps per second, with one lane per speed and thickness. In one step, the fastest
 // travels three hundred times the path through its plate.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "demos/scenes/rings.h"
 
 #include <fmt/core.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A thousand rings fall down poles, each around its pole. After E. Guendelman, R. Bridson, R. Fedkiw, "Nonconvex rigid
 // bodies with stacking", ACM TOG 22 (2003), figure 1.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A handle spins freely about its intermediate axis and flips over repeatedly (the Dzhanibekov effect, seen in orbit).
 // Nothing acts on it, so its angular momentum must be conserved.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies slide without friction over a wavy triangle mesh, the typical ground of games and robotics. Contacts with
 // internal edges, known as ghost collisions, would slow them down.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The container of a liquid: a closed box whose walls are cell faces, with a solid body of any shape inside.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The exact signed distance to a mesh, and the exact penetration depth of two meshes. It uses double precision and does
 // not depend on the library's own fields. Demos and tests use it as the reference.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The velocity of a liquid across the faces of its cells, advected by OpenVDB's tools.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Surfaces around an axis, for meshes of machine parts: rows of vertices, curves around z, and a lathe that joins them.
 #pragma once
 

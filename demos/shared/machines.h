@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Machine parts by formula, for bodies that fit into each other: pegs, poles, chains; threads.h and gears.h hold the
 // others. The meshes are closed, oriented, free of self-intersections, and have well-shaped triangles. Lengths are in
 // metres. Round outer surfaces are inscribed and round inner surfaces circumscribed, so that facets never reduce a

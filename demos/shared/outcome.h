@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The result of a scene: whether it met its criteria, its speed, the penetration depths, and its recording. All scenes
 // share this type, so that programs, tests and benchmarks print and compare them in the same way.
 #pragma once

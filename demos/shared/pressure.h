@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The pressure projection that preserves a liquid's volume: OpenVDB's conjugate gradients, with faces that a solid body
 // partly closes and a free surface between cell centres.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The program around a scene: command line, printed results, and output files.
 #pragma once
 

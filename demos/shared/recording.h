@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A recording of moving bodies, rigid ones and ones with changing surfaces, as one HTML file. The file plays in any
 // browser with orbit and scrub controls and needs no network.
 #pragma once

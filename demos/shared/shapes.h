@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Closed, oriented meshes by formula for demos, tests and benchmarks. Lengths are in metres, centred on the origin.
 #pragma once
 

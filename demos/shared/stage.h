@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The stage of a scene: a world that times every step, records frames, and afterwards measures the penetration of
 // bodies from their meshes.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The surface of an OpenVDB level set as a mesh.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bolts and nuts by formula; meshes and clearances as in machines.h.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A mesh as Bullet's own triangle mesh shape.
 #pragma once
 

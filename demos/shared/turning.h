@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The accumulated rotation of bodies, including full revolutions.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A liquid with a free surface in a box, around a solid body: a small solver on OpenVDB's tools. LevelSetAdvection
 // advects the surface, which is a level set. VolumeAdvection advects the velocities, which are stored at cell faces.
 // OpenVDB's conjugate gradients solve for the pressure (pressure.h).

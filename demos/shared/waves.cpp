@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "demos/shared/waves.h"
 
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>

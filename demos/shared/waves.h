@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A wavy ground of triangles for Bullet: static, in world coordinates.
 #pragma once
 

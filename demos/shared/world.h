@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A Bullet world whose bodies collide by their fields: the few lines that every program with bilayer and Bullet needs.
 #pragma once
 

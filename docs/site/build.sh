@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # usage: build.sh: builds the web site into build/docs/html. Undocumented public names, broken links and all other warnings
 # are errors.
 set -euo pipefail

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """usage: check_links.py DIR: checks every link of a web site to its own pages, their anchors and files, and that no page
 loads anything from elsewhere."""
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The web site: Sphinx over the pages as they are, with the reference of C++ by Doxygen and Breathe.
 
 The source folder is the whole checkout, so that links between pages need no change. The navigation is read from the tables of

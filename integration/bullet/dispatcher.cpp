@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/dispatcher.h>
 

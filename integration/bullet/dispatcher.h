@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A Bullet dispatcher that collides fields with all of Bullet's shapes.
 // Tested by tests/bullet/pairs.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Debug drawing of the parts of a field that btCollisionWorld::debugDrawWorld() does not draw. Bullet itself draws the
 // surface of a Shape as triangles (btIDebugDraw::DBG_DrawWireframe), and all contacts (DBG_DrawContactPoints). Call
 // these functions after it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <BulletDynamics/Dynamics/btActionInterface.h>
 #include <bilayer/integration/bullet/extensions.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Work at the end of each step of a Bullet world with fields, in addition to Bullet's own: continuous collision, rest
 // stabilisation and gyroscopic integration.
 // Tested by tests/bullet/gyroscopic_integrator.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rules of thumb, each with its reason. They hold for bodies of any scale: lengths are compared with voxels and with
 // each other, and with metres only where Bullet does so.
 #include <bilayer/integration/bullet/settings.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Recommended settings for a body's field, before anything is built: voxel size, band, margin and substeps.
 // docs/contacts.md lists the rules.
 #pragma once

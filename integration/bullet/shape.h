@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A Bullet collision shape for any concave body: it collides by the signed distance field of its mesh.
 //
 // Written for Bullet 3.24 as packaged: single precision, no patches. docs/contacts.md describes the pipeline.

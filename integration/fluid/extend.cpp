@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OpenVDB's fast sweeping (H. Zhao, "A fast sweeping method for Eikonal equations", 2004) over the box of a band.
 #include <bilayer/integration/fluid/extend.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Extends a level set beyond its band, by OpenVDB's fast sweeping.
 #pragma once
 

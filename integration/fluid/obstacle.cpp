@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fluid fractions from the distances at the cells' corners. A cube is cut into six tetrahedra along its diagonal, and
 // its faces into the triangles of these, so that neighbours agree on shared faces.
 #include <bilayer/integration/fluid/obstacle.h>

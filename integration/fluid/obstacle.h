@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A moving rigid body as an obstacle in a fluid solver's grid.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Jittered sampling. Each voxel draws its positions from a counter-based generator keyed by the seed, the voxel and the
 // particle. The result is independent of the order of the voxels and the number of threads.
 #include <bilayer/integration/fluid/particles.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Marker particles of a liquid.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Seeding in three steps. The body's distances are computed at the liquid's voxels, the two level sets are combined by
 // OpenVDB's CSG, and the result is repaired until openvdb::tools::checkLevelSet accepts it. All work is done on a copy.
 #include <bilayer/integration/fluid/seed.h>

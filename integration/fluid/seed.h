@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Seeds a liquid's level set from a mesh or a field, on OpenVDB's own tools.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Arguments of several functions: meshes, poses, words for enumerations, results by name.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Conversions between numpy's arrays and the library's points, indices and results.
 #pragma once
 

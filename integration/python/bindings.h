@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The parts of the module `_bilayer`, in the order in which they are added: each uses types of those before it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // build() and rebuild(), with progress and cancellation.
 #include <fmt/format.h>
 

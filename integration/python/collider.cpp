@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Collider, mass_properties(), with_body().
 #include <bilayer/collider/collider.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // collide() and distance() of two posed colliders.
 #include <bilayer/collider/contact.h>
 

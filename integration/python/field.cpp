@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Field: queries of many points, rays, spheres and boxes at once.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // seed(), particles(), obstacle(): liquids and moving solids.
 #include <fmt/format.h>
 #include <openvdb/tools/Dense.h>

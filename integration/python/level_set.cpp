@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // LevelSet: metadata, files, conversion to numpy, isosurfaces, extension beyond the band.
 #include <fmt/format.h>
 #include <openvdb/io/Stream.h>

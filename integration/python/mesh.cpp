@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Mesh, its files, inspect().
 #include <fmt/format.h>
 

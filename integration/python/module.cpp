@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The native module of the package `bilayer`: pybind11 converts arguments and results, the libraries compute.
 #include <pybind11/pybind11.h>
 

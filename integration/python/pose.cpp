@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pose: position and orientation of a body.
 #include <bilayer/collider/pose.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Floating-point sums without rounding error; internal.
 // Tested by tests/sdf/inspect.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether vectors are finite.
 // Tested by tests/collider/extremes.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Arrays on huge pages, for large data with random access.
 // Tested by tests/sdf/mesh.cpp.
 #pragma once

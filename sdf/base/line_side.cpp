@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/base/line_side.h"
 
 #include "sdf/base/exact_sum.h"

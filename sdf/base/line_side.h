@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // On which side of a line a point of the plane lies, without rounding error; internal.
 // Tested by tests/sdf/triangulate.cpp.
 #pragma once

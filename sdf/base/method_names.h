@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The names of build methods and sign methods: on the command line, in metadata, in errors and in benchmarks.
 // Tested by tests/sdf/build.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Morton order: points that are close in space are mostly close in this order.
 // Tested by tests/sdf/flood.cpp.
 #pragma once

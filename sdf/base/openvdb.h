@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OpenVDB's grids for the sources of this project: what OpenVDB's library holds compiled is not compiled again.
 //
 // Every file that creates a grid would compile the virtual functions of its tree: reading, writing, counting, ten

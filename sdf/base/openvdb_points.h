@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OpenVDB's points for the sources of this project, as sdf/base/openvdb.h gives its grids.
 // Tested by tests/sdf/vdb_io.cpp.
 #pragma once

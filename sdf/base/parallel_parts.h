@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Parallel work on the parts of a file that reports the same error as a sequential reader; internal.
 // Tested by tests/sdf/mesh_readers.cpp.
 #pragma once

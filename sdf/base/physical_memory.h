@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The physical memory of the machine. Requests that cannot fit into it are rejected early.
 // Tested by tests/sdf/build.cpp.
 #pragma once

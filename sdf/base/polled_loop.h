@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A parallel loop that can be cancelled.
 // Tested by tests/sdf/progress.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reports the progress of a build, and stops the build when its listener requests cancellation.
 #pragma once
 

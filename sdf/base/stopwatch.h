@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Measures the phases of a build.
 // Tested by tests/sdf/build.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The corners of a triangle in double precision.
 // Tested by tests/sdf/exact.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Vertex welding that reuses what is already known about the mesh; internal.
 // Tested by tests/sdf/mesh.cpp.
 #pragma once

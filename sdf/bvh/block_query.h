@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SIMD queries of the triangle hierarchy: how far each voxel of a block is from its nearest triangle, and on which side
 // of it. A voxel tests only the candidates that remain after narrowing (node_list.h).
 // Tested by tests/sdf/wide_tree.cpp.

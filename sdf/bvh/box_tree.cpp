@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Hilbert order: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707 (2004) 381-387. The
 // layout is that of packed R-trees: I. Kamel, C. Faloutsos, "On packing R-trees", CIKM 1993, 490-499.
 #include "sdf/bvh/box_tree.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A bounding volume hierarchy with eight children per node. It is implicit: nodes have no pointers, and traversal has
 // no expensive branches. Leaves are stored in Hilbert order. The user of the tree defines what a leaf holds, in most
 // cases eight triangles.

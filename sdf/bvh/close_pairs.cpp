@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. The
 // tests omit a pair only when it certainly does not intersect, so all instruction sets lead to the same counts.
 #include "sdf/bvh/close_pairs.h"

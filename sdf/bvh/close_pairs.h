@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds pairs of triangles of a mesh that may intersect, by a fast test of boxes and planes.
 // Tested by tests/sdf/triangle_tree.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SIMD distances of points to the boxes and leaves of a WideTree. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h. No sum crosses lanes, so all
 // instruction sets give the same bytes.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Binary trees over items with positions. A node's first child is the next node, and the count of nodes depends only on
 // the count of items. The place of every node is therefore known before the nodes are built, in parallel.
 // Tested by tests/sdf/winding.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lists of candidate nodes of a triangle hierarchy. A query does not start at the root: a list is narrowed from large
 // boxes of voxels to small ones.
 // Tested by tests/sdf/wide_tree.cpp.

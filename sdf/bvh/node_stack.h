@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The traversal of a tree from a node down, nearest nodes first. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
 // Tested by tests/collider/mesh_rays.cpp.

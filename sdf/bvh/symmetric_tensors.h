@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Symmetric tensors of order two and three in 3D: the moments of the triangles of a cluster.
 // Tested by tests/sdf/winding.cpp.
 #pragma once

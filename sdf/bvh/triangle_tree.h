@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A bounding volume hierarchy over the triangles of a mesh. It finds the triangles that overlap a box or a line, and
 // the parts of a mesh that lie within other parts. Boxes and corners are those of the mesh, without rounding.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A bounding volume hierarchy over the triangles of a mesh for nearest-triangle queries. Triangles are sorted in
 // Hilbert order. A leaf holds eight triangles and a group eight boxes. Nodes have no pointers, and traversal has no
 // expensive branches. Long triangles are halved first until they are as small as a block. Their boxes are then tight,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The generalized winding number: the share of all directions in which a point sees the inner side of the surface.
 //
 // A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers",

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the balls that reach each block of a brick, by a counting sort per brick.
 // Tested by tests/sdf/exact.cpp.
 #pragma once

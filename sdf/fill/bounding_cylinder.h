@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bounding cylinders of pieces: which voxels the pieces may be nearest to. Highway includes this file once for each
 // instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
 // Tested by tests/sdf/exact.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A counting sort of the items in a brick by spatial cell.
 // Tested by tests/sdf/exact.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Groups small pieces by voxel. The cost of a brick full of tiny triangles then depends on its surface area, not on the
 // triangle count.
 // Tested by tests/sdf/exact.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The double layer method, one brick at a time: triangles, samples, blocks. Only the bins of the triangles are stored
 // for the whole mesh. Memory is therefore a fraction of the mesh's, at any sample count.
 #include "sdf/fill/double_layer.h"

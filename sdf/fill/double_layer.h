@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The double layer method on the CPU: TBB over bricks, SIMD over cubes of voxels.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The exact method, one brick at a time: pieces, clusters, blocks, signs.
 #include "sdf/fill/exact.h"
 

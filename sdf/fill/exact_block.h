@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distances of one 8x8x8 block to the pieces that reach it, and the signs that they determine.
 //
 // Certificate: every point of a piece lies within the piece's radius of its sample. If a voxel's distance is at most u,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The two layers of one 8x8x8 block and the signed distances between them (section 3.2 and Eq. 3 of the paper).
 //
 // The block is processed in cubes of 4x4x4 voxels. The layer points that reach a cube are selected from the surrounding

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The samples of the double layer method in one brick. They are sorted by spatial cell and stored as columns for SIMD.
 // Tested by tests/sdf/double_layer.cpp.
 #pragma once

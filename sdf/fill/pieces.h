@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cuts triangles into pieces of about one voxel, each with a sample and a covering radius around the sample. The
 // samples select the pieces that can be nearest to a voxel, and the pieces give the distance. This is the sampling of
 // the double layer method with both layers on the surface (delta = 0). The covering radius makes the selection provably

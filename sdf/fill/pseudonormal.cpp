@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/fill/pseudonormal.h"
 
 #include <oneapi/tbb/enumerable_thread_specific.h>

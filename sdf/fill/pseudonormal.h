@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Distances from a bounding volume hierarchy, and signs from the angle-weighted pseudonormal at the closest feature: J.
 // A. Baerentzen, H. Aanaes, "Signed distance computation using the angle weighted pseudonormal", IEEE Transactions on
 // Visualization and Computer Graphics 11 (2005) 243-253; the paper calls it AWPN.

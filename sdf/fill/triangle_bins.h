@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bins triangles into bricks of space, the coarse first step of the exact and the double layer method. Bins hold only
 // indices, so their memory is a fraction of the mesh's.
 // Tested by tests/sdf/exact.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A batch of triangles, one per SIMD lane. Highway includes this file once for each instruction set: only between
 // HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
 // Tested by tests/sdf/double_layer.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The box that a triangle must overlap to be relevant.
 // Tested by tests/sdf/exact.cpp.
 #pragma once

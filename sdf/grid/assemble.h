@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Assembles filled blocks into grids. Expensive to include: it includes OpenVDB.
 // Tested by tests/sdf/build.cpp.
 #pragma once

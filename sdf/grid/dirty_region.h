@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The dirty region of a field when a part of its mesh moves: the cells within reach of the moved triangles, at their
 // old or their new position.
 // Tested by tests/sdf/rebuild.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks the distances of a level set that comes from a file; internal.
 // Tested by tests/sdf/vdb_io.cpp.
 #pragma once

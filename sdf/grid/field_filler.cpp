@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/grid/field_filler.h"
 
 #include <fmt/format.h>

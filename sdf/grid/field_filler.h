@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The state of one build. It fills a field by one method of distances and one of signs, again if needed, and makes a
 // LevelSet of the last one.
 // Tested by tests/sdf/build.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/grid/field_metadata.h"
 #include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The metadata of a field: how it was built, from what, and how its signs were found.
 // Tested by tests/sdf/build.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Updates the field of a mesh after some of its triangles have moved.
 // Tested by tests/sdf/rebuild.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fills a field by a sign method, and by another one or from a repaired mesh if the signs contradict each other.
 // Tested by tests/sdf/sign_choice.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/io/assimp_reader.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads formats that have no reader of their own here, by Assimp; internal.
 // Tested by tests/sdf/scene_io.cpp.
 #pragma once

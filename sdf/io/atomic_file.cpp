@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes to a temporary file, and keeps a list of the files in use that a signal handler may traverse at any time.
 #include "sdf/io/atomic_file.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs work in a child process, so that a crash or hang does not affect the caller.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Detects whether a polygon in the plane crosses itself; internal.
 // Tested by tests/sdf/triangulate.cpp.
 #pragma once

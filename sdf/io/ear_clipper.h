@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Triangulates a polygon in the plane by ear clipping; internal.
 // Tested by tests/sdf/triangulate.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The bytes of a glTF file: its JSON and its buffers; internal.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The JSON of a glTF file: the parts that define the shape, with members of validated types; internal.
 #pragma once
 

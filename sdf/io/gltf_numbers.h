@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads numbers from the buffers of a glTF file. Each range is checked before it is read; internal.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks that an input path is a file.
 // Tested by tests/sdf/mesh_io.cpp.
 #pragma once

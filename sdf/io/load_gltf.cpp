@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #define TINYGLTF_IMPLEMENTATION
 #include "sdf/io/load_gltf.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Loads a glTF file and the buffers that it refers to into tinygltf's model; internal.
 // Tested by tests/sdf/read_gltf.cpp.
 #pragma once

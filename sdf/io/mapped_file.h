@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory-mapped input files.
 // Tested by tests/sdf/mesh_readers.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One reader for each natively supported format; internal. Each throws std::runtime_error that names the file, the line
 // or position, and the error. Files are read in parallel; the result does not depend on it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes meshes as OBJ, STL and PLY files.
 // Tested by tests/sdf/mesh_io.cpp.
 #include <fmt/format.h>

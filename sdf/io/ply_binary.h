@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Binary data of a PLY file: values of each type in either byte order; internal.
 // Tested by tests/sdf/ply_reader.cpp.
 #pragma once

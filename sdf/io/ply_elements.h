@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Elements of PLY files, read property by property: text, and binary records of any form; internal.
 // Tested by tests/sdf/ply_reader.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Elements of binary PLY files whose records all have the same length: read in parallel at known offsets; internal.
 // Tested by tests/sdf/ply_reader.cpp.
 #pragma once

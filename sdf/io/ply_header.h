@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The header of a PLY file: its elements and their properties; internal.
 // Tested by tests/sdf/ply_reader.cpp.
 #pragma once

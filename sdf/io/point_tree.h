@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A set of points in the plane with search by region; internal.
 // Tested by tests/sdf/triangulate.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Serialises polygons for transfer from one process to another; internal.
 // Tested by tests/sdf/child_process.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The contents of a mesh file: polygons, before triangulation and welding; internal.
 // Tested by tests/sdf/mesh_readers.cpp.
 #pragma once

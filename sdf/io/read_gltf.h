@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads glTF 2.0, as text (.gltf) and binary (.glb), by tinygltf; internal.
 #pragma once
 

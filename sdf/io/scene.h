@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Common parts of scene readers: meshes placed by node transforms; internal.
 // Tested by tests/sdf/scene_io.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads scenes from formats without a native reader: glTF, and the formats of Assimp; internal.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Text records, mostly one per line, read in parallel; internal.
 // Tested by tests/sdf/mesh_readers.cpp.
 #pragma once

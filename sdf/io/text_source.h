@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Text files of meshes: words, numbers, and errors with line numbers; internal.
 // Tested by tests/sdf/mesh_readers.cpp.
 #pragma once

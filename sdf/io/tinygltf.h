@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // tinygltf as the glTF readers use it: without images, and in its own namespace, so that a program may contain another
 // build of it; internal.
 // Tested by tests/sdf/read_gltf.cpp.

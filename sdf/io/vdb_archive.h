@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes grids in OpenVDB's file format, compressed on all threads; internal.
 // Tested by tests/sdf/vdb_io.cpp.
 #pragma once

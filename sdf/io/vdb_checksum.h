@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The checksum line at the end of .vdb files; internal.
 // Tested by tests/sdf/vdb_io.cpp.
 #pragma once

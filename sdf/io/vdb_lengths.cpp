@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The format is that of OpenVDB's io::Archive, versions 222 to 224.
 #include "sdf/io/vdb_lengths.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks the lengths stored in a .vdb file. OpenVDB allocates memory for them, and reads into it, before it checks
 // them.
 // Tested by tests/sdf/vdb_io.cpp.

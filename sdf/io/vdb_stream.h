@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A .vdb file as a stream whose lengths are checked before they are used; internal.
 // Tested by tests/sdf/vdb_io.cpp.
 #pragma once

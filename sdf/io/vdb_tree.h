@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks the lengths stored in the trees of a .vdb file; internal.
 // Tested by tests/sdf/vdb_io.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Converts the distances of a block to the values of a leaf: limited to the band, every voxel signed.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The interface between a build and the code that fills its blocks. The CPU implementations are in exact.h,
 // pseudonormal.h and double_layer.h, the OpenCL implementation is in cl/filler.h.
 // Tested by tests/sdf/build.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What follows from the options of a build alone: whether they are valid, the reach of distances, the error bound.
 // Tested by tests/sdf/build.cpp.
 #pragma once

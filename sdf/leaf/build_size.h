@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The size of a build, estimated before any allocation.
 // Tested by tests/sdf/build.cpp.
 #pragma once

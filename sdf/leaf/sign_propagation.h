@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the voxels of a block that must lie on the same side of the surface. The ball around a voxel with its distance
 // as radius contains no surface. Where the balls of two neighbours overlap (d1 + d2 > 1 voxel), the segment between
 // them crosses no surface, and the two are linked. The sign of one voxel then holds for all voxels that links connect

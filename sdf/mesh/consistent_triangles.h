@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the triangles of a mesh that must keep or change their orientation together, so that neighbours agree.
 // Tested by tests/sdf/orient.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Two rounds of hash tables that fit into a core's cache. The first round searches runs of consecutive points, since
 // equal points are mostly close in the list. The second round searches the remaining points of all runs, partitioned by
 // hash. If the sample at the start of a run has no equal points, the run is left to the second round.

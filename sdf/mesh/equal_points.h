@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds vertices of a mesh with equal coordinates.
 // Tested by tests/sdf/mesh.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Orients the triangles of a mesh consistently. First, neighbours across an edge of two triangles are made to traverse
 // it in opposite directions. Then whole components are flipped, according to their volume and their nesting.
 //

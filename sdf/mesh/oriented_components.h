@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The consistently oriented components of a mesh, with their volume and their border.
 // Tested by tests/sdf/orient.cpp.
 #pragma once

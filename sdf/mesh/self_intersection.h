@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds where a surface self-intersects.
 // Tested by tests/sdf/inspect.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Classifies the two sides of a surface by winding numbers: does the surface bound a solid?
 //
 // The winding number is that of A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside segmentation using

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Connectivity of a mesh: edges with their triangles, and disjoint sets. Vertices with equal coordinates count as one.
 // Triangles keep their indices. Long operations poll a Progress, unless it is null.
 // Tested by tests/sdf/orient.cpp.

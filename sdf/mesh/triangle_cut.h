@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cuts a triangle along segments in its plane.
 // Tested by tests/sdf/unite.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where no other surface passes, neighbours lie on the same side of everything. One winding number therefore decides
 // for a patch of triangles connected in this way. Triangles that others cross or touch are cut along the lines of
 // contact, and each piece is tested separately.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The surface of the union of the solids in a mesh.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. It
 // finds the triangles through which a ray may exit, in floats with a margin for rounding. These are then measured in
 // double precision, so all instruction sets give the same result.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The thickness of the solid behind a surface.
 // Tested by tests/sdf/triangle_tree.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Inside/outside classification of a point by the angle-weighted pseudonormal of its closest feature: J. A. Baerentzen,
 // H. Aanaes, "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG 11 (2005) 243-253.
 //

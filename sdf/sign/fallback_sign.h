@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fallback sign test for the rare voxels that nearby triangles leave undecided: the winding number of the whole mesh.
 #pragma once
 

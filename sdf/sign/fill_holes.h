@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fills the holes of a mesh with triangles where the winding number shows that a border of the solid is missing.
 //
 // Minimum-area triangulation: G. Barequet, M. Sharir, "Filling gaps in the boundary of a polyhedron", Computer Aided

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Signs by reachability from outside. Handles inconsistently oriented faces and narrow gaps. Open surfaces without
 // thickness get no inside.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Branch and bound. Space is divided into cubes, starting with those that can contain the widest hole, until one is
 // small enough. A cube is discarded if no winding number in it can be one half. This follows from a bound of its slope,
 // which also holds for a cube that surfaces cross. In a ball without surface it follows from Harnack's inequality,

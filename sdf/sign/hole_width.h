@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The width of the holes of a mesh.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/sign/octree_cells.h"
 
 #include <oneapi/tbb/parallel_sort.h>

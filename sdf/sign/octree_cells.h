@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Divides the space around the leaves of a narrow band into cubes. Each leaf is a cube. The space between leaves is
 // divided into the largest octree cubes without a leaf. Sign methods traverse these cubes instead of voxels.
 // Tested by tests/sdf/flood.cpp.

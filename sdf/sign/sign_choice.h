@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Selects the sign method for a mesh, and states the reason.
 #pragma once
 

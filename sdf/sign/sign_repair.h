@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compares the signs of a field with winding numbers and corrects them. This header includes OpenVDB and is slow to
 // compile.
 #pragma once

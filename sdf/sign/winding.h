@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Signs by the generalized winding number (bvh/winding_number.h). Handles holes, overlaps and triangle soups if most
 // faces are oriented correctly.
 #pragma once

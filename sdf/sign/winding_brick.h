@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The cells of one brick of OctreeCells, found by voxel. One task signs a brick by winding numbers.
 // Tested by tests/sdf/winding.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A sign is propagated between the centres of cells. Cells in which the number may cross one half are divided.
 #include "sdf/sign/winding_cells.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Signs of the space between leaves by winding numbers.
 // Tested by tests/sdf/winding.cpp.
 #pragma once

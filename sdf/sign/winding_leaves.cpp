@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A sign is propagated from voxel to voxel as long as the number certainly stays on its side of one half.
 #include "sdf/sign/winding_leaves.h"
 

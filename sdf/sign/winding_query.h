@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The side of a point by the winding number, and how far that side is valid.
 // Tested by tests/sdf/winding.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The gradient of the winding number away from the surface of an open mesh.
 // Tested by tests/sdf/winding.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The paper's serial program and the block-wise method give the same field, value by value.
 #include "bench/paper/dense.h"
 

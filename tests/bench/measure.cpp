@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Summaries of the benchmarks must follow from their measurements.
 #include "bench/measure.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The paper's theorems at random triangles and wedges, and their limits.
 #include "bench/paper/theorems.h"
 

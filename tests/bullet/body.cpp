@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies from files in a world.
 #include "collider/contact/body.h"
 #include "collider/contact/collider_data.h"

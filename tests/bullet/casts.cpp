@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Casts against a field give the results of Bullet's own triangle mesh: rays, shape sweeps, contact tests, and Bullet's
 // CCD of fast bodies.
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>

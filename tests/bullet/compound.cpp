@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fields as children of compounds.
 #include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contact reduction: which contacts are kept, for how long, and what load they can bear.
 #include <algorithm>
 #include <array>

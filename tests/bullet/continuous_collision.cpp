@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tunnelling prevention at any speed: it acts after the solver, along the actual trajectories of bodies.
 #include <bilayer/integration/bullet/extensions.h>
 

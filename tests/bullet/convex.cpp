@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bullet's convex shapes by formula.
 #include "integration/bullet/detail/convex.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contact tests between a field and convex shapes return the distance between the shape and the triangles.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contact tests between a field and concave shapes: they return the distance between two meshes, compared with brute
 // force in double precision.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Debug drawing of fields, contacts and bands.
 #include <catch2/catch.hpp>
 #include <cmath>

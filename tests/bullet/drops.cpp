@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies of meshes with holes, cracks and self-intersections fall on all kinds of ground: none may gain energy.
 #include <algorithm>
 #include <catch2/catch.hpp>

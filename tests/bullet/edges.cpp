@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts at edges and vertices, between bodies of all kinds.
 #include <algorithm>
 #include <catch2/catch.hpp>

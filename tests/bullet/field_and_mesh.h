@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A body twice: as a field and as Bullet's triangle mesh, each in a world of its own; and convex shapes to test it
 // with.
 #pragma once

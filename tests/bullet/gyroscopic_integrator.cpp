@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Free bodies conserve their angular momentum; torques change it by the correct amount.
 #include "integration/bullet/detail/gyroscopic_integrator.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What Bullet's manifolds hold: features, impulses, friction at rest, and what the user's callbacks see and change.
 #include <catch2/catch.hpp>
 #include <cmath>

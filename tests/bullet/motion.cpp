@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies over many steps: rings on poles and in each other, slides, bounces, landings, and results that do not depend
 // on the count of threads.
 #include <tbb/global_control.h>

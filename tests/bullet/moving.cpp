@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Moving kinematic bodies, and soft bodies, against fields.
 #include <BulletSoftBody/btSoftBodyHelpers.h>
 #include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>

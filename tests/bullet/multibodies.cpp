@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Links of Bullet's multibodies as fields.
 #include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Multispheres: the distance from their hull, and the depth of balls in a groove.
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts with triangles that Bullet passes one at a time are those of the surface that they form.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 

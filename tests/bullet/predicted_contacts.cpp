@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts of bodies that are about to touch.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Resting bodies stay in place; rest stabilisation affects no other body.
 #include <bilayer/integration/bullet/extensions.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Round bodies: their height at rest, and how they roll.
 #include <algorithm>
 #include <catch2/catch.hpp>

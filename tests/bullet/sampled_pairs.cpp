@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts with points sampled by a sampler are bitwise the same as without.
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Queries of a field's shape between steps: rays, sweeps, contact tests, inertia; and arguments that it rejects.
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>

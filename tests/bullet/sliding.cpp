@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies slide according to friction, on every kind of ground.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 

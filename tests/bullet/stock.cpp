@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fields with Bullet's own dispatcher.
 #include <unistd.h>
 

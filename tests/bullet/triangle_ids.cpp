@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Part and index identify the triangle or child of a contact for users.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>

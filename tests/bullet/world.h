@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A small Bullet world for tests, and fields to put into it.
 #pragma once
 

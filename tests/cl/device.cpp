@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lists devices, opens one of them, and reports missing ones.
 #include <bilayer/cl/device.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The exact method on an OpenCL device against the ground truth: every distance, every sign, the whole band.
 #include <catch2/catch.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samples on a device: the same checks as on the CPU, and a direct comparison of both.
 #include <bilayer/cl/field.h>
 #include <bilayer/sdf/mesh_io.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Fields built by an OpenCL device against those of the CPU, by both methods and in both mappings; budgets of device
 // memory; error conditions. exact.cpp compares the exact method with the ground truth.
 #include <bilayer/cl/filler.h>

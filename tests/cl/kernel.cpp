@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The kernel files alone must be valid OpenCL C 1.2 for a compiler other than the device's.
 #include <catch2/catch.hpp>
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A device that is lost during a build. This file defines the calls that send work to a device, before the loader's.
 // They fail from a chosen call on, as drivers make them fail after the loss of a GPU.
 #include <dlfcn.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The prism method against three references: brute force over all triangles and voxels in double precision; true
 // distances where the method guarantees them; and itself, with other mappings and batch sizes.
 #include "cl/detail/prism.h"

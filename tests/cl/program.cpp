@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compiled programs: build logs, the cache on disk, the names of error codes.
 #include "cl/detail/program.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between two bodies.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a collider is made of: fields, masses, flipped and open meshes; and arguments that it rejects.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How far contacts are from those of the triangles, for each accuracy.
 #include <algorithm>
 #include <catch2/catch.hpp>

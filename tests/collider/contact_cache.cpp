@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The cache of previous steps changes only the speed of the search, never the contacts.
 #include "collider/contact/contact_cache.h"
 

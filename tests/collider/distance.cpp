@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Distances of posed bodies against brute force over all pairs of triangles in double precision.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The deepest point of an edge.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Queries with arbitrary floats: nothing crashes or hangs, and all answers are valid.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Closest points against brute force over all triangles in double precision.
 #include <oneapi/tbb/parallel_for.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points, spheres and boxes against the solid, and closest points of fields without their mesh.
 #include <oneapi/tbb/parallel_for.h>
 

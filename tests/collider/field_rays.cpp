@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ray casts, segment casts and sphere sweeps: with the mesh against brute force over all triangles in double precision,
 // without it against the interpolant.
 #include <oneapi/tbb/parallel_for.h>

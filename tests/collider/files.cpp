@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Files with invalid entries: they are refused, or the result answers all queries safely.
 #include <sys/resource.h>
 

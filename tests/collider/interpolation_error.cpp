@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds cells whose samples are off from the mesh, compared with brute-force distances.
 #include "collider/contact/interpolation_error.h"
 #include "collider/contact/collider_data.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ray and box searches among triangles against brute force in double precision, by other formulas.
 #include "collider/field/mesh_rays.h"
 

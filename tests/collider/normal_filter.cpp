@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which contacts the filter by normals removes.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Points around a mesh, and the meshes and results of closest-point queries.
 #pragma once
 

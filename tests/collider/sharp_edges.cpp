@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The sharp edges of a body.
 #include <catch2/catch.hpp>
 #include <cmath>

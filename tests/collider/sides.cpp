@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // closest(), inside() and sample() agree on which side of the surface a point is.
 #include <oneapi/tbb/parallel_for.h>
 

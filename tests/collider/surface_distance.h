@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Distances of triangles and of surfaces by brute force, in double precision.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The sample of a field's surface next to an edge.
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Times of impact of moving bodies against many distances along their motion, each by brute force over all pairs of
 // triangles in double precision.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies with fields by formula, and pairs of them in contact.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rays and spheres against fields without meshes: the zero set of the interpolant.
 #include <oneapi/tbb/parallel_for.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The demo itself, small: three bodies for one second.
 #include <fmt/core.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies whose tips, ridges, cracks and borders align exactly, after the tests of K. Erleben, "Methodology for
 // assessing mesh-based contact point methods", ACM Transactions on Graphics 37 (3), 2018.
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tests the measure of penetration that the demos use.
 #define GLM_ENABLE_EXPERIMENTAL  // for the rotation between two vectors
 #include "demos/shared/exact_distance.h"

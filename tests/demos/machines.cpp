@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Machine parts match their standards, and their fits match their clearances.
 #include "demos/shared/machines.h"
 

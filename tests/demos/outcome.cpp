@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tests the measures by which scenes are judged.
 #include "demos/shared/outcome.h"
 

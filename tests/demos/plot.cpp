@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A plot draws each point at the place of its values.
 #include "demos/shared/plot.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Each scene at small size. Criteria that the library does not meet yet are listed by name, with their value at the
 // time of writing. A listed criterion that is met fails the test, so that it is removed from the list.
 #include <catch2/catch.hpp>

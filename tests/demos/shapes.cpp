@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The carved box and the uneven sphere, the meshes of the benchmarks, have their documented properties.
 #include "demos/shared/shapes.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The small liquid solver, in cases with an analytic result.
 #include "demos/shared/water.h"
 

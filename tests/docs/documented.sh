@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Whether Doxygen finds a documentation of every public name.
 command -v doxygen >/dev/null || { echo "skipped: doxygen is not installed"; exit 4; }
 output=$(mktemp -d)

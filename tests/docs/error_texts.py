@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """usage: error_texts.py SOURCE: checks that the sources have the messages that docs/errors.md lists, and the metadata that
 docs/metadata.md lists are those that the sources name."""
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """usage: fragments.py SOURCE BUILD SCRATCH: compiles the fragments of C++ on pages, each as the body of a function.
 
 A fragment is a block of C++ that does not begin with the name of a file. A comment before it, `<!-- given: TYPE NAME, ... -->`,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pages of the documentation: their fenced blocks, and the comparison of outputs with what a page shows."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """usage: run_page.py [--write] [--given FILE] SOURCE BUILD SCRATCH PAGE
 
 Does what a page shows, in its order, in an empty folder: writes its files, runs its commands and its Python, and compares

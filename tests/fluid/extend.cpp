@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <bilayer/integration/fluid/extend.h>
 
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Liquids and bodies for tests, and checks of liquids.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <bilayer/integration/fluid/obstacle.h>
 
 #include <openvdb/tools/Diagnostics.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <bilayer/integration/fluid/particles.h>
 
 #include <openvdb/points/AttributeArray.h>

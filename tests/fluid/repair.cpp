@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Combined liquids are level sets: at edges, where boxes meet, and of real meshes.
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Seeding: the result passes OpenVDB's own check and has the correct distances; invalid input changes nothing.
 #include <openvdb/tools/Diagnostics.h>
 #include <openvdb/tools/LevelSetSphere.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OpenVDB's own level set tools accept a seeded liquid unchanged: they measure its volume, keep it in place, and advect
 // it.
 #include <openvdb/tools/Diagnostics.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks the include dependencies between folders, and forbidden text in files.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Each unit of a library, X.h and X.cpp, has tests: tests/LIBRARY/X.cpp, or the file that the comment at the top of the
 // unit names by a line "Tested by tests/...cpp."
 #include <catch2/catch.hpp>

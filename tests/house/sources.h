@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The source files of the project, for tests of what stands in them.
 #pragma once
 

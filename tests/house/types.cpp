@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // No two types of a library have one name, anonymous namespaces included: a name means one thing to readers, and two
 // classes of one name in one namespace are one class to the linker.
 #include <catch2/catch.hpp>

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Packs, moves the pack, and runs all of its programs in an empty environment with this machine's OpenCL driver. Then
 # looks where libraries came from: all that the programs need from the pack, and none twice for the driver's sake.
 set -euo pipefail

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # find_package(bilayer COMPONENTS ...) where Bullet or OpenCL are not there.
 include(${TESTS}/steps.cmake)
 set(scratch ${SCRATCH}/components)

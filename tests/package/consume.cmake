@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 include(${TESTS}/steps.cmake)
 set(build ${SCRATCH}/consumer)
 file(REMOVE_RECURSE ${build})

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Each header as a file of its own, with the installed headers and no flag but the standard's.
 include(${TESTS}/steps.cmake)
 file(GLOB_RECURSE headers RELATIVE ${prefix}/include ${prefix}/include/*.h)

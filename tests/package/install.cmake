@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 include(${TESTS}/steps.cmake)
 file(REMOVE_RECURSE ${prefix})
 step(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})

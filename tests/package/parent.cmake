@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A project with bilayer in a folder of its own, and one that fetches it.
 include(${TESTS}/steps.cmake)
 set(build ${SCRATCH}/parent)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // usage: test_python_answers MESH VOXEL_SIZE POINTS ANSWERS
 // The library's answers to the float32 points of a file, without Python: samples, closest points, contacts of the body
 // with itself one voxel aside, distance of the body from itself, three units along x. All are written as float32.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the tests share: a sphere and a box with their fields."""
 
 import numpy as np

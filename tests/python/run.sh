@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # usage: run.sh PYTHON FILE: runs a file of tests; exits with 4, which skips it, where pytest is missing.
 python=$1
 shift

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answers are those of the C++ library, to the bit."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """build() and rebuild(): options, progress, cancellation, devices."""
 
 import os

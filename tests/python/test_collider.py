@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pose, Collider, collide(), distance(), mass properties."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Docstrings, stubs, the page of docs."""
 
 import doctest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Each example runs on a small mesh and writes a picture."""
 
 import importlib.util

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Field: queries against analytic answers, shapes, bad arguments."""
 
 import copy

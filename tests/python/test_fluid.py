@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """seed(), particles(), obstacle()."""
 
 import numpy as np

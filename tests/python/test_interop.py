@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Other packages, where they are installed: nothing of bilayer imports them."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Threads, memory, and objects that outlive each other."""
 
 import gc

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Mesh, files, inspect, meshes of other packages."""
 
 import base64

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The files of a box from 0 to 1, 2 and 3 in all formats, for tests of the readers.
 #pragma once
 

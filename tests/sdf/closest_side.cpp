@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Signs by the closest feature: the exact and the pseudonormal method find the same ones.
 #include <oneapi/tbb/global_control.h>
 

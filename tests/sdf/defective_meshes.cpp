@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Defective meshes: every public mesh gets a valid field, whatever its faults, or a clear error.
 
 #include <algorithm>

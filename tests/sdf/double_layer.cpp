@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The block-wise method against the paper's program: a dense grid, sample by sample, in plain loops.
 #include "sdf/fill/double_layer.h"
 

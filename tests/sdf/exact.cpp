@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The exact method against the ground truth: every distance, every sign, the whole band, over the public meshes and
 // over shapes on which other builders fail. `bench_accuracy` does the same with more voxels.
 #include <oneapi/tbb/global_control.h>

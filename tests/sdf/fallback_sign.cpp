@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The fallback sign test of a point, against solid angles summed in double precision.
 #include "sdf/sign/fallback_sign.h"
 

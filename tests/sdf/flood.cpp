@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/sign/flood.h"
 
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF: buffers in files, data URIs and binary chunks.
 #include <sys/stat.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF: errors in the JSON of a file.
 #include <sys/stat.h>
 

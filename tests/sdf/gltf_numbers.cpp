@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF: quantised, strided and sparse numbers.
 #include <sys/stat.h>
 

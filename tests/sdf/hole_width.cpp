@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Widths of holes: round ones match the formula, rotation does not matter, closed meshes have none.
 #include "sdf/sign/hole_width.h"
 

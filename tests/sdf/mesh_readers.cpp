@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // All readers: what they leave out and report, meshes far from the origin, errors, and damaged files.
 #include <fmt/format.h>
 #include <catch2/catch.hpp>

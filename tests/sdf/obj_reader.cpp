@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OBJ files: every valid way to write them.
 #include <fmt/format.h>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OFF files: every valid way to write them.
 #include <catch2/catch.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/mesh/orient.h"
 
 #include <catch2/catch.hpp>

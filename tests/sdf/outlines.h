@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Outlines of polygons at random: simple ones of many kinds, with integer coordinates.
 #pragma once
 

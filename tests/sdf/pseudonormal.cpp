@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The pseudonormal method against brute force over all triangles.
 #include <oneapi/tbb/global_control.h>
 

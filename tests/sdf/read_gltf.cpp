@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // glTF: meshes, nodes, instances, scenes, skins and extensions.
 #include <sys/stat.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>

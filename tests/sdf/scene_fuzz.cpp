@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Damaged scene files: each is read, or refused by a one-line message that names it. BILAYER_FUZZ multiplies the
 // rounds.
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // STL files, text and binary: every valid way to write them.
 #include <catch2/catch.hpp>
 #include <cstring>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/bvh/triangle_tree.h"
 
 #include <oneapi/tbb/parallel_for.h>

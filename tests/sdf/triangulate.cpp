@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Triangulation of polygons: triangles cover the outline exactly, and outlines that cross themselves are reported.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Unions: unite() leaves the outer surface, compared with the ground truth of boxes and spheres; fields of unions are
 // exact.
 #include "sdf/mesh/unite.h"

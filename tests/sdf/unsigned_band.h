@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Unsigned narrow bands by brute force, and checks of signed ones.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The comparison of fields with the ground truth itself: it accepts exact fields, and notices each fault.
 #include <oneapi/tbb/global_control.h>
 #include <algorithm>

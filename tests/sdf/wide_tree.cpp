@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "sdf/bvh/wide_tree.h"
 
 #include <oneapi/tbb/global_control.h>

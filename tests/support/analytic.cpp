@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/analytic.h"
 
 #include <openvdb/tools/Prune.h>

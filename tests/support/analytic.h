@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Solids by formula: distances in double precision, and level sets of them made without the double layer method.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/cells.h"
 
 #include <glm/vec3.hpp>

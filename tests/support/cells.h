@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Solids with right angles: unions of cells of an axis-aligned grid. Their surface is closed, oriented and exact.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Public meshes for which the exact method guarantees an exact field.
 #pragma once
 

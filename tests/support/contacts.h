@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contact options for tests, and what they ask of contacts.
 #pragma once
 

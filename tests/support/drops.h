@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bodies that fall on five kinds of ground, and the energy that they gain. For tests and benchmarks.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Checks of samples of a field, shared by CPU and devices.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Small files in Assimp's formats, for tests.
 #pragma once
 

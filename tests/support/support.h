@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Utilities of all tests: the public corpus of meshes, a scratch folder, brute-force distances.
 #pragma once
 

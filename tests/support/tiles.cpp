@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Divides triangles into tiles: section 3.2, Algorithm 1 and Fig. 2 of the paper.
 #include "tests/support/tiles.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samples of a mesh: triangles are divided into tiles; a tile is n rows of samples by Algorithm 1 of the paper.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ground truth of a mesh at a point: its distance and winding number. It uses double precision and exact predicates,
 // shares no code with the library, and is fast enough for millions of points. Fields are compared with it; its own
 // tests compare it with sums over all triangles (support.h).

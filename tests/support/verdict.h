@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compares a narrow-band field voxel by voxel with the ground truth: distances, signs, and completeness of the band.
 // Shared by the accuracy benchmark and the tests of the exact method.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer` on input that it must reject: status 1 and one line that names the cause.
 #include <sys/stat.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer batch`: which meshes it converts, what it skips, and what it says.
 #include <algorithm>
 #include <catch2/catch.hpp>

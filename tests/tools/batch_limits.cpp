@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What can end the mesh of a `bilayer batch` ends that mesh alone; what ends the batch leaves nothing behind.
 #include <signal.h>
 

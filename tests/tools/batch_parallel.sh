@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # batch_parallel.sh BILAYER FOLDER: GNU parallel runs the shards of a batch, over ssh on the loopback interface.
 source "$(dirname "$0")/batch_shared.sh"
 need parallel ssh sshd ssh-keygen awk

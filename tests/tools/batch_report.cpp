@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer batch --report`.
 #include <catch2/catch.hpp>
 #include <fstream>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What the tests of batches under other schedulers share. They are skipped by exit status 4.
 set -euo pipefail
 

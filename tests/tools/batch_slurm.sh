@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # batch_slurm.sh BILAYER FOLDER: an array of four shards under Slurm on the loopback interface. One task is killed by
 # SIGKILL half-way and requeued. The fields are those of a batch without Slurm.
 source "$(dirname "$0")/batch_shared.sh"

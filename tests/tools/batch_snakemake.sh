@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # batch_snakemake.sh BILAYER FOLDER: the Snakefile of docs/batch.md makes the fields that a batch makes, and one rule that
 # fails leaves the others.
 source "$(dirname "$0")/batch_shared.sh"

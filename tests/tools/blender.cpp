@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Blender, if installed, opens the files of `bilayer`: a separate program with its own OpenVDB.
 #include <array>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Opens a .vdb file in Blender and prints, as a line of JSON behind "found ", its grids and the surface of the first one:
 #   blender --background --factory-startup --python-exit-code 1 --python blender.py -- FILE
 import json

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer build`: its options, its report, and what it keeps in the file.
 #include <fmt/format.h>
 #include <nanovdb/util/IO.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Small files from public bug reports, in addition to the public corpus: each gives the correct result, or a one-line
 // error with the reason.
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer query`, `surface` and `export`.
 #include <nanovdb/util/IO.h>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Output files of `bilayer` appear complete or not at all.
 #include <signal.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Libraries of small meshes, and batches over them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer` without a command, and `bilayer devices`.
 #include <nanovdb/util/IO.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `bilayer inspect` and `bilayer info`: what they report of meshes and files.
 #include <nanovdb/util/IO.h>
 #include <openvdb/tools/LevelSetSphere.h>

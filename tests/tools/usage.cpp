@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Wrong usage of `bilayer`: status 2 and a message that names the option.
 #include <sys/stat.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where a batch keeps its files.
 #pragma once
 

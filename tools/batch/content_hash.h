@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Hashes of contents and names, the same on every machine.
 #pragma once
 

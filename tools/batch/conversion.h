@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From one mesh file to one field file: what a worker of a batch does.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Locks of outputs, for batches that overlap.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The records of a batch: one JSON object a line for each mesh.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/algorithms.h"
 #include <bilayer/collider/contact.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Collision algorithms that Bullet's tables hold for pairs with a field.
 // Tested by tests/bullet/pairs.cpp.
 #pragma once

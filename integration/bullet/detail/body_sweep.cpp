@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/body_sweep.h"
 
 #include <BulletCollision/CollisionShapes/btCollisionShape.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The sweep of an object over a step that has ended.
 // Tested by tests/bullet/continuous_collision.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Casts: spheres swept through a field or a mesh until the first contact.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Collision of compounds that hold fields.
 #pragma once
 

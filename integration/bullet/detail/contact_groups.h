@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Groups of contacts with similar normals: the contact patches before their reduction.
 // Tested by tests/bullet/contact_reduction.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contact reduction: from hundreds of contacts to the few that Bullet's solver needs.
 #pragma once
 

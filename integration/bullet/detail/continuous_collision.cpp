@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/continuous_collision.h"
 
 #include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>

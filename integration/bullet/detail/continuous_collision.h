@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Continuous collision: stops bodies at the surfaces that a step would take them through.
 #pragma once
 

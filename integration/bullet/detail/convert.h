@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Conversions between Bullet's vectors and GLM's.
 // Tested by tests/bullet/pairs.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Bullet's convex shapes in closed form: signed distance, and the features to be tested against a field.
 #pragma once
 

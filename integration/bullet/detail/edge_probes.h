@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Probes: the points of an edge or a face at which another body's field is sampled.
 // Tested by tests/bullet/edges.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts of a field's surface points with the faces of triangles.
 // Tested by tests/bullet/sliding.cpp.
 #pragma once

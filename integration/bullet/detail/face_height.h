@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether the height of a field's surface point over a triangle is the exact distance of the two.
 // Tested by tests/bullet/sliding.cpp.
 #pragma once

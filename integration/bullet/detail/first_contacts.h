@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The contacts of a patch that small motions of the bodies meet first.
 // Tested by tests/bullet/contact_reduction.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Gyroscopic integrator: rigid bodies that rotate by Euler's equations.
 #pragma once
 

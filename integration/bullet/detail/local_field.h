@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A field from the view of the other body of a pair: in metres, in the field's axes, with the relative motion of the
 // other body.
 // Tested by tests/bullet/edges.cpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes contacts into Bullet's manifolds, and carries impulses and friction anchors from step to step.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The warning about fields in a process without a dispatcher for them; internal.
 //
 // For two concave shapes, Bullet's own tables hold an algorithm that does nothing, so neither shape is called when such

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The convex hull of spheres, which is what Bullet's multispheres are. Its surface consists of spheres, cones tangent
 // to two of them, and planes tangent to three.
 #pragma once

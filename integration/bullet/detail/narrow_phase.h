@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between a field and Bullet's own shapes. Body A is the other shape, body B the field. Speculative contacts
 // beyond the margin are made where a point's motion meets the other body. Motions are about the positions of the poses;
 // a plane's motion is about the world's origin.

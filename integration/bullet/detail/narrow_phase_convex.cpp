@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between a field and convex shapes.
 // Tested by tests/bullet/edges.cpp.
 #include <bilayer/collider/contact.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Contacts between a field and triangles that Bullet passes one at a time.
 // Tested by tests/bullet/open_surface.cpp.
 #include <LinearMath/btAabbUtil2.h>

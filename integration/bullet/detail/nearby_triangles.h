@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The triangles of an open surface near a field, as Bullet passes them.
 // Tested by tests/bullet/sliding.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The nearest point of a convex shape's surface.
 // Tested by tests/bullet/convex.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Open surfaces: the two-sided triangles that Bullet passes one at a time. Edges with equal end points are shared.
 #pragma once
 

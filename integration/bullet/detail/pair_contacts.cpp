@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/pair_contacts.h"
 
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>

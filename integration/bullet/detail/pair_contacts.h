@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A pair of bodies, one of them a field: from their shapes to contacts in Bullet.
 // Tested by tests/bullet/pairs.cpp.
 #pragma once

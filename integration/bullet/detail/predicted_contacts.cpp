@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/predicted_contacts.h"
 #include "collider/contact/collider_data.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Predicted contacts of rotating bodies.
 #pragma once
 

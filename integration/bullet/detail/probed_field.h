@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A field that is collided with the triangles of an open surface, and the lengths of the search.
 // Tested by tests/bullet/sliding.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/rest_stabilisation.h"
 
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>

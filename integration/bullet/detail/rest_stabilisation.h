@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rest stabilisation: bodies at rest keep their positions.
 #pragma once
 

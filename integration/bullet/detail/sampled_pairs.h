@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The pairs of fields of a step whose points a sampler samples in one batch, for example on an OpenCL device.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The surfaces for continuous collision, each in its own coordinates and units. All have
 //
 // - std::optional<SurfaceEntry> entry(from, to, radius): where a sphere enters on a straight path; its start if inside;

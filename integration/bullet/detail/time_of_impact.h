@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Time of impact of two shapes in a step.
 // Tested by tests/bullet/continuous_collision.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The distance of a point from a triangle.
 // Tested by tests/bullet/convex.cpp.
 #pragma once

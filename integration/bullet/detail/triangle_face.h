@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The face of a triangle: its plane, and where points are over it.
 // Tested by tests/bullet/sliding.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/triangle_ids.h"
 
 #include <BulletCollision/CollisionShapes/btTriangleCallback.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Finds the triangle of a mesh or a height field that a contact touches, for example to look up a material; internal.
 #pragma once
 

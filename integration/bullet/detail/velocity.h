@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Velocities of the objects of a world.
 // Tested by tests/bullet/multibodies.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "integration/fluid/detail/placement.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The check of a body's placement.
 // Tested by tests/fluid/seed.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Resampling a field at other voxels would blend distances across the medial axis, and after non-uniform scaling its
 // values are no distances. So the surface is transferred, and distances are computed again: as fast, and exact.
 #include "integration/fluid/detail/regrid.h"

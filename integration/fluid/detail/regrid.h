@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Resamples bodies into a fluid's own voxels.
 // Tested by tests/fluid/seed.cpp.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // OpenVDB accepts a grid as a level set only if |gradient|^2, by WENO differences and Godunov's upwinding, is in [0.5,
 // 1.5] at all voxels next to the surface. Creases, walls below a voxel and noise violate that.
 //

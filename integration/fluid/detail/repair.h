@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Repairs a combined level set so that openvdb::tools::checkLevelSet accepts it.
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Exact narrow-band signed distance fields of triangle meshes, and queries and contacts on them.
 
 >>> import bilayer

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Meshes of other packages, and simple shapes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What functions return: named tuples of arrays, and the report of a mesh."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the examples share: their arguments, and pictures without a screen."""
 
 import argparse

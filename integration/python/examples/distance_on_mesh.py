@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The exact distance to one mesh, coloured on a second mesh: where two parts come close."""
 
 import matplotlib.pyplot as plt

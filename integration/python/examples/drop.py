@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A body dropped on a tilted slab by a solver of thirty lines of numpy on bilayer.collide()."""
 
 import matplotlib.pyplot as plt

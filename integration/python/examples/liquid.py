@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A liquid body above a tank, seeded into one level set, with marker particles; saved for Houdini or Blender."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Training samples for a neural SDF of a dirty mesh: near the surface and uniform, with exact signed distances.
 
 The mesh has holes, flipped faces, and a second solid that overlaps it; signs come from winding numbers. Writes

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pairwise distances of 200 bodies, all 19,900 exact."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A slice of a signed distance field, everywhere exact: inside blue, outside red, the surface black."""
 
 import matplotlib.pyplot as plt

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // User code against the installed headers and all five libraries.
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
 #include <bilayer/cl/device.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A minimal user of the sources, added by add_subdirectory or FetchContent: a cube, its field, its surface.
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/surface.h>
