@@ -21,17 +21,18 @@ struct DeviceError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// What a device is and can do.
 struct DeviceInfo {
-    std::string platform;         ///< "Portable Computing Language"
-    std::string name;             ///< "pthread-AMD EPYC"
-    std::string version;          ///< "OpenCL 3.0 PoCL HSTR: ..."
-    std::string platformVersion;  ///< "OpenCL 3.0 PoCL 3.1 ..."
-    std::string driver;           ///< "3.1"
-    bool gpu = false;
-    bool unifiedMemory = false;     ///< host and device share one memory
-    bool exactSquareRoots = false;  ///< rounds square roots correctly
-    bool doubles = false;           ///< supports double precision
-    unsigned computeUnits = 0;
+    std::string platform;                  ///< "Portable Computing Language"
+    std::string name;                      ///< "pthread-AMD EPYC"
+    std::string version;                   ///< "OpenCL 3.0 PoCL HSTR: ..."
+    std::string platformVersion;           ///< "OpenCL 3.0 PoCL 3.1 ..."
+    std::string driver;                    ///< "3.1"
+    bool gpu = false;                      ///< false: a processor or an accelerator
+    bool unifiedMemory = false;            ///< host and device share one memory
+    bool exactSquareRoots = false;         ///< rounds square roots correctly
+    bool doubles = false;                  ///< supports double precision
+    unsigned computeUnits = 0;             ///< count
     std::uint64_t memoryBytes = 0;         ///< global memory [bytes]
     std::uint64_t maxAllocationBytes = 0;  ///< largest single buffer [bytes]
 };
@@ -40,8 +41,10 @@ struct DeviceInfo {
 /// builds. Copies share them. Several threads may use it at once; each build takes device memory of its own.
 class Device {
   public:
+    /// From its data; for internal use.
     explicit Device(std::shared_ptr<detail::DeviceImpl> impl) : impl_(std::move(impl)) {}
-    const DeviceInfo& info() const;
+    const DeviceInfo& info() const;  ///< What it is and can do. Valid as long as a copy of the device lives.
+    /// The data of the device; for internal use.
     detail::DeviceImpl& impl() const { return *impl_; }
 
   private:

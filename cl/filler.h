@@ -36,10 +36,11 @@ struct OpenclTimes {
     }
 };
 
+/// Options for filling blocks on a device.
 struct OpenclOptions {
     /// Limit of device memory [MiB]; 0: three quarters of the device's memory. Blocks stream through it in batches.
     std::uint64_t memoryMiB = 0;
-    KernelMapping mapping = KernelMapping::automatic;
+    KernelMapping mapping = KernelMapping::automatic;  ///< how kernels divide the work of a block
     /// Whether the device measures the times in OpenclTimes, which costs an event for each command. Without it only
     /// OpenclTimes::peakBytes is known, and the times are 0.
     bool profile = false;

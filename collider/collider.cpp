@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Construction of colliders from meshes and from files.
 #include <bilayer/collider/collider.h>
 
 #include <stdexcept>

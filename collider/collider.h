@@ -27,6 +27,7 @@ enum class ContactAccuracy {
 /// The name in files and on the command line: samples, edges or triangles.
 const char* nameOf(ContactAccuracy accuracy);
 
+/// Options for making a collider.
 struct ColliderOptions {
     /// Distance between neighbouring surface points, in voxels of the field. A smaller spacing finds finer contacts and
     /// costs more. Curved surfaces get denser points, which limits the penetration between points to 0.05 spacings.
@@ -59,7 +60,7 @@ class Collider {
     /// The mesh, with all triangles facing outward; the triangles over its holes come last. If the body has no mesh,
     /// one is extracted from the field at the first call and kept.
     const Mesh& mesh() const;
-    const Field& field() const;
+    const Field& field() const;  ///< the field that its queries use
     /// The field with the mesh, if the body has one. This is field() itself if contacts use triangles; otherwise it is
     /// created at the first call, and shares the samples.
     const Field& exactField() const;

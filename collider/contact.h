@@ -35,10 +35,10 @@ struct Motion {
 
 /// A collider placed in the world, with an optional uniform scale. Body coordinates x map to pose.toWorld(scale * x).
 struct Placed {
-    const Collider& collider;
-    Pose pose{};
-    float scale = 1;  ///< positive; also scales distances
-    Motion motion{};
+    const Collider& collider;  ///< the body's shape; must outlive the call
+    Pose pose{};               ///< of the body's mesh in the world
+    float scale = 1;           ///< positive; also scales distances
+    Motion motion{};           ///< over the step, without the scale
 };
 
 /// A shape placed in the world, with an optional uniform scale. Body coordinates x map to pose.toWorld(scale * x).
@@ -69,8 +69,10 @@ struct Contact {
     float remaining() const { return distance - approach; }
 };
 
+/// The bit of Contact::feature that says that the feature is of B.
 inline constexpr std::uint32_t featureOfB = 0x80000000u;
 
+/// Options of collide().
 struct ContactOptions {
     /// Contacts are reported up to this separation [m], and as speculative contacts beyond it where a point's motion
     /// hits the other surface. The exterior band must be sqrt(3) voxels wider than the margin to find all contacts
@@ -112,9 +114,12 @@ class ContactCache {
   public:
     ContactCache();
     ~ContactCache();
+    /// Takes over the data of another cache, which may then only be destroyed or assigned to.
     ContactCache(ContactCache&&) noexcept;
+    /// The same, in place of its own data.
     ContactCache& operator=(ContactCache&&) noexcept;
 
+    /// The data; for internal use.
     detail::ContactMemory& data() { return *data_; }
 
   private:

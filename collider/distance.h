@@ -11,6 +11,7 @@
 
 namespace bilayer {
 
+/// Options of distance().
 struct DistanceOptions {
     /// The search ends early if the separation exceeds this [m]. Zero finds only bodies that overlap or touch.
     float maxDistance = std::numeric_limits<float>::infinity();
@@ -28,17 +29,18 @@ enum class Overlap {
 struct WitnessPoint {
     glm::vec3 position{0};                ///< in world coordinates [m]
     std::uint32_t triangle = noTriangle;  ///< index in Collider::mesh(); `noTriangle`: not known
-    Feature feature = Feature::face;
-    std::uint8_t index = 0;  ///< of the edge (from corner `index` of the triangle to the next) or corner
+    Feature feature = Feature::face;      ///< of that triangle: its face, an edge or a corner
+    std::uint8_t index = 0;               ///< of the edge (from corner `index` of the triangle to the next) or corner
 };
 
 /// The answer of distance().
 struct BodyDistance {
-    bool found = false;  ///< false: the separation exceeds the limit; the other members are invalid
-    Overlap overlap = Overlap::none;
+    bool found = false;               ///< false: the separation exceeds the limit; the other members are invalid
+    Overlap overlap = Overlap::none;  ///< whether and how they overlap
     /// Separation of the solids, or minus the penetration depth of the deepest contact [m].
     float distance = std::numeric_limits<float>::infinity();
-    WitnessPoint a, b;
+    WitnessPoint a;  ///< on A: the closest point, or where the penetration is measured
+    WitnessPoint b;  ///< the same on B
     /// Unit vector from B to A: moving A along it separates the bodies. Zero if touching bodies define none.
     glm::vec3 normal{0};
 };
@@ -46,7 +48,8 @@ struct BodyDistance {
 /// The triangles of the last answer for a pair of bodies. A search that starts from them is fast while bodies move
 /// little from call to call; the distance is the same.
 struct DistanceStart {
-    std::uint32_t triangleA = noTriangle, triangleB = noTriangle;
+    std::uint32_t triangleA = noTriangle;  ///< index in Collider::mesh() of A; `noTriangle`: not known
+    std::uint32_t triangleB = noTriangle;  ///< the same of B
 };
 
 /// The signed distance of two bodies at any separation, between their triangle meshes (Collider::mesh()).
@@ -73,6 +76,7 @@ BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& o
 BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const DistanceOptions& options = {},
                       DistanceStart* start = nullptr);
 
+/// Options of timeOfImpact().
 struct ImpactOptions {
     /// Bodies touch at this separation [m]. At least 1e-5 of the size of the larger body counts. By default it is a
     /// twentieth of the smaller voxel.
@@ -83,7 +87,8 @@ struct ImpactOptions {
 struct Impact {
     bool found = false;     ///< false: the bodies do not touch in the whole motion; the other members are invalid
     float fraction = 1;     ///< of the motion until they touch, in [0, 1]
-    Pose poseA, poseB;      ///< of the bodies then
+    Pose poseA;             ///< of A then
+    Pose poseB;             ///< of B then
     BodyDistance distance;  ///< of the bodies then: where they touch
 };
 

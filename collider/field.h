@@ -28,8 +28,9 @@ enum class Storage {
     fixed16,
 };
 
+/// Options for laying out a field.
 struct FieldOptions {
-    Storage storage = Storage::float32;
+    Storage storage = Storage::float32;  ///< how distances are stored
 };
 
 /// A level set laid out for queries. Copies share memory. All queries are noexcept, allocate nothing, and may run on
@@ -121,13 +122,18 @@ class Field {
 
     /// Batch versions of the above. They throw std::invalid_argument if the spans differ in length.
     void inside(std::span<const glm::vec3> points, std::span<bool> answers) const;
+    /// raycast() of each ray.
     void raycast(std::span<const Ray> rays, std::span<std::optional<RayHit>> hits) const;
+    /// segment() of each pair of points.
     void segment(std::span<const glm::vec3> from, std::span<const glm::vec3> to,
                  std::span<std::optional<RayHit>> hits) const;
+    /// sphereCast() of each ray with its radius.
     void sphereCast(std::span<const Ray> rays, std::span<const float> radii,
                     std::span<std::optional<RayHit>> hits) const;
+    /// overlapsSphere() of each centre with its radius.
     void overlapsSphere(std::span<const glm::vec3> centres, std::span<const float> radii,
                         std::span<bool> answers) const;
+    /// overlapsBox() of each box.
     void overlapsBox(std::span<const OrientedBox> boxes, std::span<bool> answers) const;
 
     glm::dvec3 origin() const noexcept;     ///< lower corner of the box around the band [m]
@@ -139,7 +145,7 @@ class Field {
     const Mesh* mesh() const noexcept;
     /// The query data; for internal use. Valid as long as the field or a copy of it lives.
     const detail::FieldData& data() const noexcept { return *data_; }
-    std::size_t memoryBytes() const noexcept;
+    std::size_t memoryBytes() const noexcept;  ///< of all that its queries use, the mesh included [bytes]
 
   private:
     std::shared_ptr<const detail::FieldData> data_;

@@ -13,7 +13,9 @@ struct Pose {
     glm::vec3 position{0};           ///< [m]
     glm::quat rotation{1, 0, 0, 0};  ///< unit quaternion; w, x, y, z
 
+    /// A point of the body in world coordinates.
     glm::vec3 toWorld(const glm::vec3& point) const { return rotation * point + position; }
+    /// A point of the world in the body's coordinates.
     glm::vec3 toBody(const glm::vec3& point) const { return glm::conjugate(rotation) * (point - position); }
 };
 

@@ -26,6 +26,7 @@ struct Sample {
 /// The kind of triangle feature that a closest point lies on.
 enum class Feature : std::uint8_t { face, edge, vertex };
 
+/// In place of a triangle's index where there is none.
 inline constexpr std::uint32_t noTriangle = ~0u;
 
 /// The point of a surface that is closest to a query point.
@@ -35,9 +36,9 @@ struct ClosestPoint {
     /// Outward unit normal: of the face, or for an edge or vertex the angle-weighted mean of the adjacent triangles.
     glm::vec3 normal{0};
     std::uint32_t triangle = noTriangle;  ///< index in the mesh; `noTriangle` for a field without its mesh
-    Feature feature = Feature::face;
-    std::uint8_t index = 0;  ///< of the edge (from corner `index` of the triangle to the next) or corner
-    bool found = false;      ///< false: no point within the search radius; the other members are invalid
+    Feature feature = Feature::face;      ///< of that triangle: its face, an edge or a corner
+    std::uint8_t index = 0;               ///< of the edge (from corner `index` of the triangle to the next) or corner
+    bool found = false;                   ///< false: no point within the search radius; the other members are invalid
 };
 
 /// A ray, or the path of a sphere's centre.

@@ -40,6 +40,7 @@ class BlockFiller {
 /// @param filler  the device that fills the blocks; null: the CPU, by TBB
 /// Throws std::invalid_argument that names the invalid option or triangle, Cancelled, and what the filler throws.
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler = nullptr);
+/// The same by a device.
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler);
 
 /// Updates the field of a mesh after some of its triangles have moved. Fills only the blocks within reach of the old or

@@ -11,6 +11,7 @@
 
 namespace bilayer {
 
+/// The OpenVDB grids that a LevelSet holds.
 struct Grids {
     /// GRID_LEVEL_SET, in world units. Background: +exterior width. Inactive voxels inside: -interior width.
     openvdb::FloatGrid::ConstPtr distance;
@@ -28,17 +29,17 @@ inline constexpr const char* contactPoints = "contact_points";
 /// Names of the metadata on the distance grid. `interiorWidth` stores the interior width, since the background gives
 /// only the exterior width.
 namespace metadata {
-inline constexpr const char* method = "bilayer:method";
-inline constexpr const char* sign = "bilayer:sign";
-inline constexpr const char* signReason = "bilayer:sign_reason";
-inline constexpr const char* signConflicts = "bilayer:sign_conflicts";
-inline constexpr const char* signUndecided = "bilayer:sign_undecided";
-inline constexpr const char* errorBound = "bilayer:error_bound";
-inline constexpr const char* meshHash = "bilayer:mesh_hash";
-inline constexpr const char* interiorWidth = "bilayer:interior_width";
+inline constexpr const char* method = "bilayer:method";                 ///< LevelSet::method()
+inline constexpr const char* sign = "bilayer:sign";                     ///< LevelSet::sign()
+inline constexpr const char* signReason = "bilayer:sign_reason";        ///< LevelSet::signReason()
+inline constexpr const char* signConflicts = "bilayer:sign_conflicts";  ///< LevelSet::signConflicts()
+inline constexpr const char* signUndecided = "bilayer:sign_undecided";  ///< count of voxels whose normals cancel out
+inline constexpr const char* errorBound = "bilayer:error_bound";        ///< LevelSet::errorBound() [m]
+inline constexpr const char* meshHash = "bilayer:mesh_hash";            ///< LevelSet::meshHash()
+inline constexpr const char* interiorWidth = "bilayer:interior_width";  ///< LevelSet::interiorWidth() [m]
 /// Mesh::origin, if not zero. The transforms of grids in files include it as a shift; those in memory do not.
 inline constexpr const char* origin = "bilayer:origin";
-inline constexpr const char* version = "bilayer:version";
+inline constexpr const char* version = "bilayer:version";  ///< of bilayer, which wrote the field
 }  // namespace metadata
 
 /// Returns a grid of a level set with the origin in its transform, as in files. The tree is shared.

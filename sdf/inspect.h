@@ -12,8 +12,8 @@ namespace bilayer {
 
 /// The result of inspect(). A mesh is closed, oriented and clean if every defect count is zero.
 struct MeshReport {
-    std::size_t points = 0;
-    std::size_t triangles = 0;
+    std::size_t points = 0;               ///< count
+    std::size_t triangles = 0;            ///< count
     std::size_t components = 0;           ///< sets of triangles connected by shared vertices
     Bounds bounds;                        ///< relative to the origin [m]
     glm::dvec3 origin{0};                 ///< Mesh::origin [m]

@@ -18,7 +18,7 @@ struct BuildTimes {
     double tiles = 0;     ///< sorting triangles into sample tiles, or choosing a sign method
     double fill = 0;      ///< binning triangles into blocks, computing distances
     double assemble = 0;  ///< building the tree, signs far from the surface, signs by winding number or flood
-    double total = 0;
+    double total = 0;     ///< of the whole build
     /// Blocks of 8x8x8 voxels whose distances were computed. A block counts again for each sign method that is tried.
     /// rebuild() copies all other blocks.
     std::size_t filledBlocks = 0;
@@ -55,6 +55,7 @@ class LevelSet {
     /// Times of the build that made the field; zeros for a field from a file.
     const BuildTimes& buildTimes() const;
     std::uint64_t meshHash() const;  ///< hash() of the source mesh, or 0
+    /// Its OpenVDB grids: include sdf/grids.h to use them.
     const Grids& grids() const { return *grids_; }
 
   private:

@@ -23,13 +23,17 @@ struct Mesh {
 
 /// An axis-aligned box [m]; empty (lower > upper) by default.
 struct Bounds {
-    glm::vec3 lower{1e30f};
-    glm::vec3 upper{-1e30f};
+    glm::vec3 lower{1e30f};   ///< lower corner [m]
+    glm::vec3 upper{-1e30f};  ///< upper corner [m]
 
+    /// Lengths of the sides [m].
     glm::vec3 size() const { return upper - lower; }
+    /// [m]
     glm::vec3 centre() const { return 0.5f * (lower + upper); }
-    float longestSide() const;
+    float longestSide() const;  ///< [m]
+    /// Whether it holds no point.
     bool empty() const { return lower.x > upper.x; }
+    /// Grows to hold a point.
     void add(const glm::vec3& point) {
         lower = glm::min(lower, point);
         upper = glm::max(upper, point);

@@ -25,8 +25,8 @@ struct ReadReport {
 
 /// A mesh and what its file contains.
 struct MeshFile {
-    Mesh mesh;
-    ReadReport report;
+    Mesh mesh;          ///< the triangles of the file
+    ReadReport report;  ///< what the file held, and what was left out
 };
 
 /// Reads a mesh from OBJ, PLY, STL, OFF, RAW, glTF or any other format that Assimp supports. The file extension selects
@@ -40,6 +40,7 @@ struct MeshFile {
 /// Throws std::runtime_error if the file cannot be read or holds no triangle. The error names the file and, where
 /// known, the line and its text. Throws std::invalid_argument for coordinates that are not finite.
 Mesh readMesh(const std::filesystem::path& path);
+/// The same, with a report of what the file held and what was left out.
 MeshFile readMeshFile(const std::filesystem::path& path);
 
 /// Writes a mesh in world coordinates as .obj, binary .ply or binary .stl. An error leaves no partial file. Coordinates

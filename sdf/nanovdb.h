@@ -16,6 +16,7 @@ namespace bilayer {
 /// An immutable NanoVDB grid; this header does not include NanoVDB's. Copies share memory.
 class NanoGrid {
   public:
+    /// From the bytes of a grid, aligned to 32 bytes, and their count.
     NanoGrid(std::shared_ptr<const std::byte> memory, std::size_t size) : memory_(std::move(memory)), size_(size) {}
 
     /// The whole grid, for upload without changes. The first byte is aligned to 32 bytes; copies of the bytes need the

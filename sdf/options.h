@@ -22,7 +22,7 @@ struct DoubleLayerOptions {
     float epsilon = 1.0f;     ///< area per sample [voxels^2], in [1e-4, 1e4]
     int neighbourhood = 2;    ///< K: a sample reaches K + 1/2 voxels, or more if the band requires it, in 1..64
     int maxSubdivision = 32;  ///< n_max: maximum rows of samples in one piece of a triangle, in 1..1024
-    Subdivision subdivision = Subdivision::rows;
+    Subdivision subdivision = Subdivision::rows;  ///< how triangles are cut into samples
     /// true: fills the gaps that Algorithm 1 leaves at slivers and at triangles too large for n_max rows. Such
     /// triangles are first cut into pieces, thin pieces are sampled along their length, and K grows with the band. The
     /// band is then complete.
@@ -47,6 +47,7 @@ enum class Sign {
     flood,      ///< inside: not reachable from outside through gaps wider than `gapVoxels`
 };
 
+/// Options of build().
 struct BuildOptions {
     /// Edge length of a voxel [m], required, at least 2e-5. Scale a smaller mesh first, for example by 1000 from metres
     /// to millimetres.
@@ -55,9 +56,9 @@ struct BuildOptions {
     // Divide a width in metres by voxelSize.
     float exteriorWidthVoxels = 3;  ///< voxels with 0 <= distance < this are active, in (0, 1000]
     float interiorWidthVoxels = 3;  ///< voxels with -this < distance < 0 are active, in (0, 1000]
-    Method method = Method::exact;
-    Sign sign = Sign::automatic;
-    float gapVoxels = 2;  ///< Sign::flood closes gaps up to this width, in [0, 100]
+    Method method = Method::exact;  ///< how distances are computed
+    Sign sign = Sign::automatic;    ///< how the inside is found
+    float gapVoxels = 2;            ///< Sign::flood closes gaps up to this width, in [0, 100]
     /// true: builds the union of overlapping solids. Walls inside the union are ignored, distances inside refer to
     /// the union's outer surface, and winding numbers give the signs. Triangle indices then refer to the mesh with its
     /// outward orientation.
@@ -66,9 +67,9 @@ struct BuildOptions {
     /// The report of inspect() for this mesh; null: not available. With it, Sign::automatic selects winding numbers at
     /// once for a closed mesh that self-intersects, and skips the sign comparison for one that does not.
     const MeshReport* inspected = nullptr;
-    DoubleLayerOptions doubleLayer{};
-    bool triangles = false;  ///< also store the nearest triangle of each active voxel
-    int threads = 0;         ///< maximum thread count; 0: all
+    DoubleLayerOptions doubleLayer{};  ///< of Method::doubleLayer
+    bool triangles = false;            ///< also store the nearest triangle of each active voxel
+    int threads = 0;                   ///< maximum thread count; 0: all
     /// Called repeatedly with the completed fraction (0..1), from any thread but never concurrently. Return false to
     /// cancel.
     std::function<bool(float)> progress{};

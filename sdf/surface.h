@@ -7,6 +7,7 @@
 
 namespace bilayer {
 
+/// Options of surface().
 struct SurfaceOptions {
     float isovalue = 0;    ///< distance at the extracted surface [m]; must lie within the band
     float adaptivity = 0;  ///< 0: uniform mesh, 1: fewest triangles in flat regions

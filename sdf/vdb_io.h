@@ -8,6 +8,7 @@
 
 namespace bilayer {
 
+/// Options of writeVdb().
 struct VdbOptions {
     bool halfFloat = false;  ///< store distances as 16-bit floats: half the size, 3 significant decimal digits
 };

@@ -67,4 +67,7 @@ void addExport(CLI::App& app);
 void addSeed(CLI::App& app);
 void addDevices(CLI::App& app);
 
+/// The version of the program, and those of the compiler and the libraries that it was built with, a line each.
+std::string versions();
+
 }  // namespace bilayer::tools

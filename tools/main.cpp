@@ -39,7 +39,7 @@ int flushOutput() {
 int main(int count, char** arguments) {
     setSignals();
     CLI::App app("Narrow-band signed distance fields from triangle meshes, in OpenVDB files.", "bilayer");
-    app.set_version_flag("--version", "bilayer " BILAYER_VERSION);
+    app.set_version_flag("--version", bilayer::tools::versions());
     app.require_subcommand(1);
     bilayer::tools::addBuild(app);
     bilayer::tools::addBatch(app);

@@ -39,6 +39,8 @@ struct DispatchStatistics {
 /// line on the standard error output reports it. DispatchStatistics::sampled is then 0.
 class Dispatcher : public btCollisionDispatcher {
   public:
+    /// Registers algorithms for fields with every shape of Bullet. The configuration must outlive the dispatcher.
+    /// @param sampler  samples surface points on a device, for example openclPointSampler(); empty: on the processor
     explicit Dispatcher(btCollisionConfiguration* configuration, PointSampler sampler = {});
     ~Dispatcher() override;
 
@@ -46,10 +48,11 @@ class Dispatcher : public btCollisionDispatcher {
     /// btGImpactCollisionAlgorithm::registerAlgorithm, which overwrites a row and a column.
     void registerFields();
 
+    /// Finds the contacts of a step, of all pairs with fields as one parallel batch. Bullet calls it.
     void dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
                                    btDispatcher* dispatcher) override;
 
-    const DispatchStatistics& statistics() const;
+    const DispatchStatistics& statistics() const;  ///< of the last step
 
   private:
     struct Functions;

@@ -11,6 +11,7 @@
 
 namespace bilayer::bullet {
 
+/// What is drawn, and in which colours.
 struct DrawOptions {
     bool band = true;                      ///< outline of the leaves that hold the band
     bool points = false;                   ///< surface points, drawn as normals as long as the point spacing

@@ -10,6 +10,7 @@
 
 namespace bilayer::bullet {
 
+/// Options of WorldExtensions.
 struct ExtensionOptions {
     /// Tunnelling prevention: no body passes through a field, and no field through anything, at any speed and any
     /// thickness.
@@ -67,6 +68,7 @@ struct ExtensionOptions {
 /// leaves the world as it was.
 class WorldExtensions {
   public:
+    /// Acts at the end of each step of the world, which must outlive this object.
     explicit WorldExtensions(btDynamicsWorld& world, const ExtensionOptions& options = {});
     ~WorldExtensions();
     WorldExtensions(const WorldExtensions&) = delete;

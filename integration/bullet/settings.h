@@ -26,6 +26,7 @@ struct SceneRequirements {
 
 inline constexpr int maxSubsteps = 1'000'000;  ///< upper limit, which also stands for larger counts
 
+/// What recommendSettings() recommends for a body, and what it costs.
 struct Settings {
     float voxelSize = 0;                 ///< [m]
     float margin = 0;                    ///< ColliderOptions::margin [m]
@@ -39,8 +40,8 @@ struct Settings {
     std::uint64_t voxels = 0;  ///< active voxels, approximate
     /// approximate size of the Field in memory [bytes]; a thin body may take as little as half of it
     std::uint64_t fieldBytes = 0;
-    double buildSeconds = 0;  ///< approximate, on two cores of 2023 [s]
-    std::vector<std::string> warnings;
+    double buildSeconds = 0;            ///< approximate, on two cores of 2023 [s]
+    std::vector<std::string> warnings;  ///< what to expect in spite of these settings, a sentence each
 };
 
 /// Recommends settings for a body from its mesh. Throws std::invalid_argument that names any value that is not

@@ -14,6 +14,7 @@
 
 namespace bilayer::bullet {
 
+/// Options of Shape.
 struct ShapeOptions {
     /// Pose of the collider in the body: collider coordinates x become frame.toWorld(x). Bullet takes the body's origin
     /// for the centre of mass and its axes for the principal axes. Use centreOfMassFrame() for a mesh that is modelled
@@ -55,27 +56,37 @@ Pose centreOfMassFrame(const Collider& collider);
 /// - It is wrong where collision filters keep the two fields apart.
 class Shape : public btConcaveShape {
   public:
+    /// Throws std::invalid_argument for no collider, a margin that is not finite, and a friction at rest
+    /// below 1.
     explicit Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options = {});
     ~Shape() override;
 
+    /// The field, surface points and mass that it collides with.
     const Collider& collider() const { return *collider_; }
+    /// ShapeOptions::frame.
     const Pose& frame() const { return frame_; }
     /// The collider in the world for a body at this transform.
     Placed placed(const btTransform& bodyTransform) const;
+    /// ShapeOptions::speculative.
     bool speculative() const { return speculative_; }
+    /// ShapeOptions::restingFriction.
     float restingFriction() const { return restingFriction_; }
     /// The edge length of a voxel after scaling [m].
     float voxelSize() const { return scale() * collider_->field().voxelSize(); }
 
     /// Takes positive uniform scales only. Throws std::invalid_argument for others.
     void setLocalScaling(const btVector3& scaling) override;
+    /// The scale along each axis; all three are the same.
     const btVector3& getLocalScaling() const override { return scaling_; }
+    /// The uniform scale.
     float scale() const { return scaling_.x(); }
 
     /// ShapeOptions::margin, but after scaling [m].
     void setMargin(btScalar margin) override;
+    /// The margin after scaling [m].
     btScalar getMargin() const override { return m_collisionMargin; }
 
+    /// The bounding box of the body, with its margin [m].
     void getAabb(const btTransform& transform, btVector3& lower, btVector3& upper) const override;
     /// Computed from the mesh, about the body's origin. Throws std::invalid_argument for a mesh without volume.
     void calculateLocalInertia(btScalar mass, btVector3& inertia) const override;
@@ -89,6 +100,7 @@ class Shape : public btConcaveShape {
     /// The threshold in voxels. Bullet's default is a fraction of the body's size, which merges contacts on fine
     /// features.
     btScalar getContactBreakingThreshold(btScalar defaultFactor) const override;
+    /// "bilayer".
     const char* getName() const override { return "bilayer"; }
 
   private:

@@ -28,8 +28,9 @@ struct Solid {
     openvdb::FloatGrid::Ptr openVolume;  ///< `open_volume`: fluid fraction of each cell, 0..1
 };
 
+/// Options of solid().
 struct SolidOptions {
-    Velocity velocity{};
+    Velocity velocity{};        ///< of the obstacle
     float halfWidthVoxels = 3;  ///< half width of `distance` and `velocity`, at least 3
     /// As BuildOptions::progress, of the distances at the cells' centres and corners.
     std::function<bool(float)> progress{};
@@ -45,6 +46,7 @@ struct SolidOptions {
 /// the world, for a velocity that is not finite, and for a half width out of 3..1000; and Cancelled.
 Solid solid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& cells,
             const SolidOptions& options = {});
+/// The same from a field.
 Solid solid(const LevelSet& field, const Placement& placement, const openvdb::math::Transform& cells,
             const SolidOptions& options = {});
 

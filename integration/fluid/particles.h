@@ -15,6 +15,7 @@
 
 namespace bilayer::fluid {
 
+/// Options of particles().
 struct ParticleOptions {
     int perVoxel = 8;        ///< particles in a voxel that is entirely inside, in 1..1000
     std::uint64_t seed = 0;  ///< the same seed gives the same particles, for any number of threads
@@ -24,6 +25,7 @@ struct ParticleOptions {
     std::function<glm::vec3(const glm::vec3& point)> velocity{};
 };
 
+/// What particles() returns.
 struct Particles {
     std::vector<glm::vec3> positions;   ///< [m]
     std::vector<glm::vec3> velocities;  ///< of each particle; empty if ParticleOptions::velocity is not set [m/s]

@@ -17,19 +17,27 @@ namespace bilayer::fluid {
 /// The pose of a body in the world, after scaling along its own axes: body coordinates x become pose.toWorld(scale *
 /// x).
 struct Placement {
-    Pose pose{};
+    Pose pose{};         ///< applied after the scale
     glm::vec3 scale{1};  ///< positive: a reflection would invert the body
 
     Placement() = default;
+    /// A pose, perhaps with a scale along each axis of the body.
     Placement(const Pose& placed, const glm::vec3& stretch = glm::vec3(1)) : pose(placed), scale(stretch) {}
 
+    /// A point of the body in world coordinates [m].
     glm::dvec3 toWorld(const glm::dvec3& point) const {
         return glm::dquat(pose.rotation) * (glm::dvec3(scale) * point) + glm::dvec3(pose.position);
     }
 };
 
-enum class SeedMode { unite, intersect, subtract };
+/// The operation that combines a body with the liquid.
+enum class SeedMode {
+    unite,      ///< the body becomes liquid
+    intersect,  ///< only the liquid inside the body remains
+    subtract,   ///< the liquid inside the body goes
+};
 
+/// Options of seed().
 struct SeedOptions {
     SeedMode mode = SeedMode::unite;  ///< CSG operation with the existing liquid
     /// Whether overlapping solids of the mesh are united: walls inside their union are then no surface
@@ -38,6 +46,7 @@ struct SeedOptions {
     /// As BuildOptions::progress, of the body's distances.
     std::function<bool(float)> progress{};
 
+    /// A mode alone is a set of options too: seed(liquid, mesh, placement, SeedMode::subtract).
     SeedOptions(SeedMode how = SeedMode::unite, bool solids = true) : mode(how), uniteSolids(solids) {}
 };
 

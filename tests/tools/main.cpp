@@ -11,7 +11,10 @@ using namespace bilayer::test;
 
 TEST_CASE("help and version") {
     CHECK(run({"--help"}).status == 0);
-    CHECK(run({"--version"}).out.rfind("bilayer 0.", 0) == 0);
+    const std::string versions = run({"--version"}).out;
+    CHECK(versions.rfind("bilayer 0.", 0) == 0);
+    for (const char* part : {"compiler", "OpenVDB", "oneTBB", "Assimp", "Highway", "Bullet"})
+        CHECK(versions.find(std::string("\n") + part + "  ") != std::string::npos);
     for (const char* command : {"build", "batch", "inspect", "info", "query", "surface", "export", "seed", "devices"}) {
         const Result r = run({command, "--help"});
         CHECK(r.status == 0);

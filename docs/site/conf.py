@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The web site: Sphinx over the pages as they are, with the reference of C++ by Doxygen and Breathe.
+
+The source folder is the whole checkout, so that links between pages need no change. The navigation is read from the tables of
+docs/README.md; the pages of docs/reference/ get what the public headers declare.
+"""
+
+import re
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).resolve().parents[2]
+XML = ROOT / "build" / "docs" / "doxygen" / "xml"
+NAMESPACES = ("bilayer", "bilayer::bullet", "bilayer::fluid")
+
+project = "bilayer"
+copyright = "the authors of bilayer"
+version = release = re.search(r"project\(bilayer VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text()).group(1)
+
+extensions = ["myst_parser", "breathe"]
+root_doc = "README"
+source_suffix = {".md": "markdown"}
+include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "RELEASE.md", "docs/**.md"]
+exclude_patterns = ["docs/site/**"]
+myst_heading_anchors = 4
+myst_enable_extensions = []
+highlight_language = "none"
+
+html_theme = "furo"
+html_title = f"bilayer {release}"
+html_static_path = []
+html_copy_source = False
+html_show_sphinx = False
+html_show_copyright = False
+
+breathe_projects = {"bilayer": str(XML)}
+breathe_default_project = "bilayer"
+breathe_default_members = ("members",)
+breathe_show_include = False
+primary_domain = "cpp"
+
+LINK = re.compile(r"\]\(([\w./-]+\.md)(?:#[\w-]*)?\)")
+
+
+def navigation():
+    """The sections of docs/README.md with the pages that they name first; each page once."""
+    seen = {"README"}
+    for section in re.split(r"^## ", (ROOT / "docs" / "README.md").read_text(), flags=re.M)[1:]:
+        pages = []
+        for link in LINK.findall(section):
+            page = str((ROOT / "docs" / link).resolve().relative_to(ROOT)).removesuffix(".md")
+            if page not in seen:
+                seen.add(page)
+                pages.append(page)
+        if pages:
+            yield section.splitlines()[0], pages
+
+
+def contents():
+    return "".join(f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n/" + "\n/".join(pages) + "\n```\n"
+                   for caption, pages in [("All pages", ["docs/README"]), *navigation()])
+
+
+def declared(xml):
+    """What Doxygen found in a header: directives of Breathe with the names of types, functions and constants, by place."""
+    for inner in xml.iter("innerclass"):
+        kind = "class" if inner.get("refid").startswith("class") else "struct"
+        detail = "::detail::" in inner.text or inner.get("prot") == "private"
+        if not detail and inner.text.rpartition("::")[0] in NAMESPACES:
+            place = ElementTree.parse(XML / f"{inner.get('refid')}.xml").find("compounddef/location").get("line")
+            yield int(place), f"doxygen{kind}", inner.text, ":members:\n"
+    for member in xml.iter("memberdef"):
+        name, kind = member.findtext("qualifiedname"), member.get("kind")
+        types = ["".join(parameter.find("type").itertext()) for parameter in member.iter("param")]
+        arguments = f"({', '.join(types)})" if kind == "function" else ""
+        yield int(member.find("location").get("line")), f"doxygen{kind}", name + arguments, ""
+
+
+def reference(folder):
+    """Directives for all public headers of a library, in the order of their declarations."""
+    for header in sorted((ROOT / folder).glob("*.h")):
+        yield f"\n## `{folder}/{header.name}`\n"
+        found = set()
+        for path in XML.glob("*.xml"):
+            compound = ElementTree.parse(path).find("compounddef")
+            if compound is None or compound.get("kind") != "file" or compound.find("location").get("file") != f"{folder}/{header.name}":
+                continue
+            found.update(declared(compound))
+        for _, directive, name, options in sorted(found):
+            yield f"\n```{{{directive}}} {name}\n{options}```\n"
+
+
+def add_to_page(app, name, source):
+    if name == "README":
+        source[0] += contents()
+    folder = re.search(r"^<!-- reference of (\S+) -->$", source[0], re.M)
+    if folder:
+        source[0] += "".join(reference(folder.group(1)))
+
+
+def add_index(app, error):
+    if error is None:
+        shutil.copy(Path(app.outdir) / "README.html", Path(app.outdir) / "index.html")
+
+
+def setup(app):
+    app.connect("source-read", add_to_page)
+    app.connect("build-finished", add_index)

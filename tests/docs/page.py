@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pages of the documentation: their fenced blocks, and the comparison of outputs with what a page shows."""
+
+import re
+from dataclasses import dataclass
+
+BLOCK = re.compile(r"(?:^<!-- given: (?P<given>[^\n]*?) -->\n+)?^```(?P<language>[\w-]*)\n(?P<text>.*?)^```$", re.M | re.S)
+NUMBER = re.compile(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
+# rows of times, memory and processors: only their presence is compared
+MEASURED = re.compile(r"^\s*(files|time|build|peak memory|filled by)\s.*$", re.M)
+RELATIVE_TOLERANCE = 0.02  # numbers on a page hold for other processors too
+ROUNDING_STEPS = 2         # of the last digit printed
+
+
+@dataclass
+class Block:
+    language: str
+    text: str
+    begin: int  # of the text within the page
+    given: str | None = None  # parameters of a fragment of C++
+
+    def file_name(self):
+        """The name in a comment on the first line, of a block that is a whole file: `// field.cpp`, `# CMakeLists.txt`."""
+        match = re.match(r"(?://|#) (\w[\w.-]*\.\w+)\n", self.text)
+        return match.group(1) if match else None
+
+
+def blocks(page):
+    return [Block(m["language"], m["text"], m.start("text"), m["given"]) for m in BLOCK.finditer(page)]
+
+
+def commands(text):
+    """The commands of a console block with the outputs that it shows: lines that begin with "$ ", and what follows."""
+    pairs = []
+    for line in text.splitlines(keepends=True):
+        if line.startswith("$ "):
+            pairs.append((line[2:].rstrip("\n"), ""))
+        elif not pairs:
+            raise SystemExit(f"a console block begins with output: {line}")
+        else:
+            pairs[-1] = (pairs[-1][0], pairs[-1][1] + line)
+    return pairs
+
+
+def close(a, b):
+    x, y = (float(text.replace(",", "")) for text in (a, b))
+    digits = [len(text.split(".")[1]) if "." in text and "e" not in text else 0 for text in (a, b)]
+    return abs(x - y) <= max(RELATIVE_TOLERANCE * max(abs(x), abs(y)), ROUNDING_STEPS * 10.0 ** -max(digits))
+
+
+def same_output(shown, printed):
+    """Whether an output has the words of the one that is shown, and numbers within the tolerance."""
+    shown, printed = (MEASURED.sub(r"\1", text) for text in (shown, printed))
+    words = [[" ".join(part.split()) for part in NUMBER.split(text)] for text in (shown, printed)]
+    numbers = [NUMBER.findall(text) for text in (shown, printed)]
+    return words[0] == words[1] and all(close(a, b) for a, b in zip(*numbers))
