@@ -268,6 +268,15 @@ TEST_CASE("outlines that cross themselves or enclose nothing are reported") {
     checkWrong({{0, 10}, {6, -8}, {-9, 3}, {9, 3}, {-6, -8}}, random);  // a pentagram
     // a band whose ends overlap: its total rotation is one turn to the left, like that of a simple outline
     checkWrong({{0, 0}, {10, 0}, {10, 10}, {4, 10}, {4, -4}, {6, -4}, {6, 8}, {8, 8}, {8, 2}, {0, 2}}, random);
+    // around twice: edges only touch or overlap
+    checkWrong({{0, 2}, {1, 0}, {2, 2}, {0, 2}, {1, 1}, {2, 2}}, random);
+    checkWrong({{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {4, 0}, {4, 4}, {0, 4}}, random);
+    for (const std::size_t corners : {10u, 100u}) {
+        Outline twice = star(corners, 10000, random);
+        const Outline once = twice;
+        twice.insert(twice.end(), once.begin(), once.end());
+        checkWrong(twice, random);
+    }
     int wrong = 0;
     for (int i = 0; i < 300; ++i) {
         CAPTURE(i);
