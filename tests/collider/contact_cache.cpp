@@ -85,7 +85,7 @@ TEST_CASE("contacts are the same with what was kept of the steps before, however
     CHECK(tested != testedAnew);
 }
 
-TEST_CASE("bodies that rest beside each other cost little, those that touch little more than their contacts") {
+TEST_CASE("bodies that rest next to each other cost little, those that touch little more than their contacts") {
     const Placed a{knot()};
     const auto testedAtRest = [&](const Placed& b, std::vector<Contact>& contacts) {
         ContactCache near;

@@ -139,7 +139,7 @@ TEST_CASE("no ray leaves a closed mesh through an edge or a vertex") {
     }
 }
 
-TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing beside it") {
+TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing next to it") {
     constexpr double tolerance = 1e-7;
     const unsigned start = seed();
     CAPTURE(start);

@@ -160,7 +160,7 @@ TEST_CASE("convex corners stay, whatever the spacing") {
     REQUIRE(glm::distance(nearest(cone, {0, 0, 1}).position, glm::vec3(0, 0, 1)) < 1e-6f);
 }
 
-TEST_CASE("an edge keeps its points before the faces beside it") {
+TEST_CASE("an edge keeps its points before the faces next to it") {
     // finely divided, so that all of its points can be vertices
     const SurfacePoints points(shapes::box({1, 1, 1}, 30), 0.25f);
     for (float along = -1; along <= 1; along += 0.01f) {

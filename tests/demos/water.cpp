@@ -58,7 +58,7 @@ TEST_CASE("a pool stays at rest, around a body too, wherever its surface is betw
     CHECK(water.volume() == Approx(water.kept()).epsilon(around ? 2e-3 : 2e-4));
 }
 
-TEST_CASE("a ball that spins beside a wall leaves a pool at rest") {
+TEST_CASE("a ball that spins next to a wall leaves a pool at rest") {
     demo::Basin basin(*cells(), Coord(side));
     basin.place(sphereAt({0.3f, 0.5f, 0.3f}, {{}, {0, 0, 6}}));  // its distances reach into the wall
     demo::Water water(*pool(0.4f), basin, {.restoring = 0});
