@@ -71,10 +71,9 @@ class Field {
     /// - The result is exact to 1e-5 voxels up to ten voxels away, and to a millionth of the distance beyond.
     /// - The sign is the field's wherever that is certain: farther than a voxel's diagonal from the surface, and mostly
     ///   nearer. inside() and the sign of sample() agree with it there.
-    /// - Elsewhere, in a closed mesh signed by normals or winding numbers, it is that of the mesh's winding number.
-    /// Only
-    ///   the normal at the closest feature decides within a tenth of a voxel of a surface signed by normals, and where
-    ///   the sample agrees with it. Both err only where the surface meets itself within a voxel.
+    /// - Elsewhere, in a closed mesh signed by normals or winding numbers, it is that of the mesh's winding number. In
+    ///   one signed by normals, the normal at the closest feature decides where the sample agrees with it, and within a
+    ///   tenth of a voxel of the surface. That errs only where the surface meets itself within a voxel.
     /// - Elsewhere, in other meshes, the normal decides if the field confirms that the wall separates inside from
     ///   outside; otherwise the sample.
     /// - Any one of the features that are equally close within the tolerance is returned. At an edge or vertex itself,

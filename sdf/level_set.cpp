@@ -69,7 +69,7 @@ void requireErrorBound(const openvdb::GridBase& grid, const std::string& method,
     const bool hasBound = method == nameOf(Method::exact) || method == nameOf(Method::pseudonormal);
     const float least = hasBound ? (1 - rounding) * detail::errorBound({}) : 0, h = float(grid.voxelSize()[0]);
     require(errorBound >= least * h && (std::isfinite(errorBound) || !hasBound), grid, metadata::errorBound, errorBound,
-            hasBound ? "finite and at least 1e-4 voxels by this method" : "0 or above");
+            hasBound ? "finite and at least the error of its method" : "0 or above");
 }
 
 // Methods with signs of their own have no others.

@@ -43,6 +43,9 @@ std::shared_ptr<Arguments> addArguments(CLI::App& command, const char* name, con
     return arguments;
 }
 
+/// The narrowest band that OpenVDB's check of level sets accepts [voxels], and the rounding of a width.
+constexpr double minCheckedWidth = 3, rounding = 1e-5;
+
 // Returns nothing for a mesh that encloses no volume.
 template <class Solid>
 std::optional<MassProperties> massOf(const Solid& solid) {
@@ -109,10 +112,32 @@ void runInspect(const InspectArguments& a) {
 }
 
 // Returns OpenVDB's verdict on the grid as a level set. It is only a remark, since a field may have two different
-// widths.
+// widths. A width of three voxels up to rounding is as wide as OpenVDB wants it.
 std::string remark(const LevelSet& field) {
-    const std::string text = openvdb::tools::checkLevelSet(*field.grids().distance);
+    const openvdb::FloatGrid& grid = *field.grids().distance;
+    const double voxels = double(grid.background()) / grid.voxelSize()[0];
+    std::string text;
+    if (voxels < minCheckedWidth && voxels >= (1 - rounding) * minCheckedWidth) {
+        openvdb::tools::CheckLevelSet<openvdb::FloatGrid> check(grid);
+        text = check.checkTiles();
+        if (text.empty()) text = check.checkFinite();
+        if (text.empty()) text = check.checkRange();
+        if (text.empty()) text = check.checkInactiveValues();
+        if (text.empty()) text = check.checkEikonal();
+    } else {
+        text = openvdb::tools::checkLevelSet(grid);
+    }
     return text.substr(0, text.find('\n'));
+}
+
+// Returns why a field has no mass.
+std::string whyMassless(const LevelSet& field) {
+    try {
+        massProperties(field);
+    } catch (const std::invalid_argument& error) {
+        return error.what();
+    }
+    return "its body is stored without";
 }
 
 Bounds activeBounds(const LevelSet& field) {
@@ -158,7 +183,7 @@ void printInfo(const ReportArguments& a, const LevelSet& field, const Json& grid
     addRows(table, field);
     if (body) addRows(table, *body);
     table.row("bounds", boxText(activeBounds(field), field.origin()));
-    table.row("volume", mass ? fmt::format("{:.6g} m^3", mass->volume) : "none");
+    table.row("volume", mass ? fmt::format("{:.6g} m^3", mass->volume) : "none: " + whyMassless(field));
     addRows(table, mass, field.origin());
     if (field.meshHash()) table.row("mesh hash", hex(field.meshHash()));
     const std::string text = remark(field);

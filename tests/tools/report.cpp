@@ -146,6 +146,32 @@ TEST_CASE("inspect and info report the mass") {
     CHECK(run({"inspect", scratch("lidless.obj").string(), "--json"}).json()["mass"].is_null());
 }
 
+TEST_CASE("info reports bodies of any size that build accepts, and why one has no mass") {
+    const auto path = scratch("tetrahedron.obj");
+    const std::string output = scratch("tetrahedron.vdb").string();
+    for (const float size : {1e-10f, 1e-3f, 0.1f, 1e4f, 1e8f, 1e10f, 1e13f}) {
+        CAPTURE(size);
+        writeMesh(path, {{{0, 0, 0}, {size, 0, 0}, {0, size, 0}, {0, 0, size}},
+                         {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}});
+        const Result built = run({"build", path.string(), "-o", output, "--body", "--resolution", "12"});
+        if (size < 2e-4f) {
+            CHECK_THAT(built.err, Catch::Contains("scale the mesh"));
+            continue;
+        }
+        REQUIRE(built.status == 0);
+        const Result table = run({"info", output});
+        CAPTURE(table.out);
+        REQUIRE(table.status == 0);
+        CHECK_THAT(table.out, !Catch::Contains("less than 3 voxel"));
+        const auto json = run({"info", output, "--json"}).json();
+        if (json["mass"].is_null())
+            CHECK_THAT(table.out, Catch::Contains("beyond single precision"));
+        else
+            CHECK(json["mass"]["volume"].get<double>() == Approx(std::pow(double(size), 3) / 6));
+        CHECK(json["mass"].is_null() == (size > 1e9f));
+    }
+}
+
 TEST_CASE("info accepts fields of other programs") {
     openvdb::initialize();
     const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1, openvdb::Vec3f(0), 0.1f);
