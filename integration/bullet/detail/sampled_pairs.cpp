@@ -2,10 +2,11 @@
 #include <bilayer/collider/contact.h>
 #include "collider/contact/sampled_contacts.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
-#include <cstdio>
 #include <exception>
+
+#include "integration/bullet/detail/warning.h"
 
 namespace bilayer::bullet::detail {
 
@@ -39,8 +40,9 @@ bool SampledPairs::sample() {
         sampler_.sample(bodies_, queries_, found_);
         return true;
     } catch (const std::exception& error) {
-        fmt::print(stderr, "bilayer: contacts are found by the processor from now on, not by {}: {}\n", sampler_.device,
-                   error.what());
+        warn(
+            fmt::format("contacts are found by the processor from now on, not by {}: {}", sampler_.device, error.what())
+                .c_str());
         sampler_ = {};
         return false;
     }
