@@ -16,7 +16,7 @@
 #include "integration/bullet/detail/algorithms.h"
 #include "integration/bullet/detail/compound.h"
 #include "integration/bullet/detail/continuous_collision.h"
-#include "collider/contact/sampled_pairs.h"
+#include "integration/bullet/detail/sampled_pairs.h"
 
 namespace bilayer::bullet {
 

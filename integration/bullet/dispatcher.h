@@ -36,7 +36,7 @@ struct DispatchStatistics {
 /// A sampler, for example `openclPointSampler(device)`, samples the surface points of all pairs of fields in one batch.
 /// Pairs whose motion needs speculative contacts are excluded. The contacts are the same bits where the device computes
 /// as IEEE 754 specifies. If the sampler fails, the processor takes over within the same step and permanently, and a
-/// line on the standard error output reports it. DispatchStatistics::sampled is then 0.
+/// warning reports it (see setWarningCallback()). DispatchStatistics::sampled is then 0.
 class Dispatcher : public btCollisionDispatcher {
   public:
     /// Registers algorithms for fields with every shape of Bullet. The configuration must outlive the dispatcher.
@@ -78,5 +78,13 @@ class FieldAlgorithms {
     btCollisionDispatcher& dispatcher_;
     std::unique_ptr<Functions> functions_;
 };
+
+/// Receives a warning, without a line break. It must not throw, and may be called from any thread.
+using WarningCallback = void (*)(const char* message);
+
+/// Sets the function that receives the warnings of this library: a missing dispatcher (see Shape), and a sampler that
+/// has failed. The default, nullptr, prints each as a line on the standard error output. A warning that comes once
+/// comes again after this call. Returns the previous function.
+WarningCallback setWarningCallback(WarningCallback callback);
 
 }  // namespace bilayer::bullet

@@ -253,9 +253,7 @@ Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& optio
     m_collisionMargin = options.margin < 0 ? collider_->margin() : options.margin;
 }
 
-Shape::~Shape() {
-    forgetBoxes(this);
-}
+Shape::~Shape() = default;
 
 Placed Shape::placed(const btTransform& bodyTransform) const {
     const Pose body = toPose(bodyTransform);
@@ -278,7 +276,7 @@ void Shape::setMargin(btScalar margin) {
 
 void Shape::getAabb(const btTransform& transform, btVector3& lower, btVector3& upper) const {
     boxOf(transform, lower, upper);
-    noteBox(this, transform, lower, upper);
+    noteBox(this, transform);
 }
 
 void Shape::boxOf(const btTransform& transform, btVector3& lower, btVector3& upper) const {
@@ -301,6 +299,7 @@ void Shape::calculateLocalInertia(btScalar mass, btVector3& inertia) const {
 }
 
 void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& lower, const btVector3& upper) const {
+    noteTriangles(*callback);
     if (auto* ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
         const Placed here = placed(btTransform::getIdentity());
         if (const MeshTree* mesh = collider_->exactField().data().mesh.get()) return castRay(here, *mesh, *ray);

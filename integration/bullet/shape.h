@@ -48,12 +48,11 @@ Pose centreOfMassFrame(const Collider& collider);
 /// collides the triangles of the mesh with convex bodies, and collides nothing with concave ones: the body passes
 /// through other fields, planes, triangle meshes and height fields.
 ///
-/// Bullet never calls the shapes of such a pair, so the class can warn only from the bounding boxes. It warns once in a
-/// process, on the standard error output: when the box of a dynamic body with a field meets another field's box while
-/// the process has no Dispatcher and no FieldAlgorithms at all. The limits of this warning:
-/// - It misses dynamic compounds and worlds without getDispatchInfo().m_useContinuous.
+/// The class warns once (see setWarningCallback()) when the process has no Dispatcher and no FieldAlgorithms at all,
+/// and a world moves a dynamic body with a field, or Bullet collides a field's triangles with a convex body. The limits
+/// of this warning:
+/// - It misses worlds without getDispatchInfo().m_useContinuous, and dynamic compounds, until they meet convex bodies.
 /// - It misses all worlds of a process that has a Dispatcher for one of them.
-/// - It is wrong where collision filters keep the two fields apart.
 class Shape : public btConcaveShape {
   public:
     /// Throws std::invalid_argument for no collider, a margin that is not finite, and a friction at rest

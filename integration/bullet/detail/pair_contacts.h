@@ -12,7 +12,7 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/dispatcher.h>
-#include "collider/contact/sampled_pairs.h"
+#include "integration/bullet/detail/sampled_pairs.h"
 #include "integration/bullet/detail/convex_shape.h"
 #include "integration/bullet/detail/manifolds.h"
 

@@ -14,7 +14,9 @@
 #include "collider/contact/sampled_contacts.h"
 #include "collider/contact/sampled_points.h"
 
-namespace bilayer::detail {
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
 
 class SampledPairs {
   public:
@@ -50,4 +52,4 @@ class SampledPairs {
     FoundPoints found_;
 };
 
-}  // namespace bilayer::detail
+}  // namespace bilayer::bullet::detail

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "collider/contact/sampled_pairs.h"
+#include "integration/bullet/detail/sampled_pairs.h"
 #include <bilayer/collider/contact.h>
 #include "collider/contact/sampled_contacts.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
-#include <cstdio>
 #include <exception>
 
-namespace bilayer::detail {
+#include "integration/bullet/detail/warning.h"
+
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
 
 void SampledPairs::clear() {
     bodies_.clear();
@@ -38,11 +41,12 @@ bool SampledPairs::sample() {
         sampler_.data().sample(bodies_, queries_, found_);
         return true;
     } catch (const std::exception& error) {
-        fmt::print(stderr, "bilayer: contacts are found by the processor from now on, not by {}: {}\n",
-                   sampler_.device(), error.what());
+        warn(fmt::format("contacts are found by the processor from now on, not by {}: {}", sampler_.device(),
+                         error.what())
+                 .c_str());
         sampler_ = {};
         return false;
     }
 }
 
-}  // namespace bilayer::detail
+}  // namespace bilayer::bullet::detail
