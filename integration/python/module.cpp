@@ -24,5 +24,6 @@ PYBIND11_MODULE(_bilayer, module) {
     python::addPose(module);
     python::addCollider(module);
     python::addContact(module);
+    python::addDistance(module);
     python::addFluid(module);
 }

@@ -30,6 +30,7 @@ from bilayer._bilayer import (
     read_mesh,
     rebuild,
     seed,
+    time_of_impact,
     with_body,
 )
 from bilayer.meshes import as_mesh, box, sphere
@@ -39,6 +40,7 @@ from bilayer.results import (
     Contacts,
     Dense,
     Hits,
+    Impact,
     MassProperties,
     MeshReport,
     Samples,
@@ -57,6 +59,7 @@ __all__ = [
     "DeviceError",
     "Field",
     "Hits",
+    "Impact",
     "LevelSet",
     "MassProperties",
     "Mesh",
@@ -82,5 +85,6 @@ __all__ = [
     "rebuild",
     "seed",
     "sphere",
+    "time_of_impact",
     "with_body",
 ]
