@@ -59,7 +59,7 @@ void answer(const Mesh& mesh, float voxelSize, const std::vector<glm::vec3>& poi
         const Ray ray{point, -point};
         const auto hit = field.raycast(ray), sphere = field.sphereCast(ray, 0.1f);
         file.add(hit ? hit->distance : infinite), file.add(sphere ? sphere->distance : infinite);
-        file.add(hit ? float(hit->triangle) : -1), file.add(field.inside(point));
+        file.add(hit && hit->triangle != noTriangle ? float(hit->triangle) : -1), file.add(field.inside(point));
     }
     const Collider collider(mesh, levelSet);
     std::vector<Contact> contacts;
