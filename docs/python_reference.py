@@ -11,7 +11,7 @@ GROUPS = {
     "Queries": ["Field", "Samples", "ClosestPoints", "Hits"],
     "Bodies": [
         "Pose", "Collider", "with_body", "mass_properties", "MassProperties", "collide", "Contacts", "ContactCache",
-        "distance", "distances", "BodyDistance",
+        "distance", "distances", "BodyDistance", "time_of_impact", "Impact",
     ],
     "Liquids": ["seed", "Seeded", "particles", "obstacle", "Obstacle"],
 }

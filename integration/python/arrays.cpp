@@ -150,12 +150,14 @@ std::vector<std::uint32_t> indices(const py::handle& object, const char* name, p
         refuse(name, expected, description(object, array));
     const auto values = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(array);
     if (!values) throw py::error_already_set();
+    const std::int64_t* const data = values.data();
+    const Shape whole(array.shape(), array.shape() + array.ndim());
+    const py::gil_scoped_release release;
     std::vector<std::uint32_t> result(static_cast<std::size_t>(values.size()));
     for (std::size_t i = 0; i < result.size(); ++i) {
-        const std::int64_t value = values.data()[i];
+        const std::int64_t value = data[i];
         if (value < 0 || std::uint64_t(value) >= end)
-            throw std::invalid_argument(fmt::format("{}{} is {}, and must be {} of 0 to {}", name,
-                                                    indexText(i, Shape(array.shape(), array.shape() + array.ndim())),
+            throw std::invalid_argument(fmt::format("{}{} is {}, and must be {} of 0 to {}", name, indexText(i, whole),
                                                     value, what, std::int64_t(end) - 1));
         result[i] = std::uint32_t(value);
     }

@@ -13,6 +13,7 @@ void addField(pybind11::module_& module);
 void addPose(pybind11::module_& module);
 void addCollider(pybind11::module_& module);
 void addContact(pybind11::module_& module);
+void addDistance(pybind11::module_& module);
 void addFluid(pybind11::module_& module);
 
 }  // namespace bilayer::python

@@ -2,12 +2,8 @@
 // build() and rebuild(), with progress and cancellation.
 #include <fmt/format.h>
 
-#include <atomic>
-#include <chrono>
 #include <cmath>
-#include <exception>
 #include <functional>
-#include <future>
 #include <optional>
 #include <stdexcept>
 
@@ -18,13 +14,11 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "integration/python/cancellable.h"
 #include "sdf/base/method_names.h"
 
 namespace bilayer::python {
 namespace {
-
-/// How often a build looks for signals and reports progress.
-constexpr std::chrono::milliseconds pollInterval(20);
 
 /// Options in errors of the library, and their names here.
 constexpr std::array<std::pair<const char*, const char*>, 5> optionNames{
@@ -151,59 +145,23 @@ std::string withOptionNames(std::string message) {
     return message;
 }
 
-// Calls `progress` with the fraction. Returns false if it returned False.
-bool report(const py::object& progress, float fraction) {
-    if (progress.is_none()) return true;
-    const py::object answer = progress(fraction);
-    return answer.is_none() || answer.cast<bool>();
-}
-
-// Runs a build on a thread of its own, while the calling thread, to which signals belong, reports progress and looks
-// for Ctrl-C. All errors are raised after the build has ended.
-LevelSet watched(Request& request, const std::function<LevelSet(const BuildOptions&)>& job) {
-    std::atomic<float> fraction = 0;
-    std::atomic<bool> cancelled = false;
-    request.options.progress = [&](float done) {
-        fraction = done;
-        return !cancelled;
-    };
-    std::exception_ptr raised;
-    std::optional<LevelSet> result;
-    {
-        auto running = std::async(std::launch::async, [&] { return job(request.options); });
-        const auto finished = [&] {
-            const py::gil_scoped_release release;
-            return running.wait_for(pollInterval) == std::future_status::ready;
-        };
-        while (!finished()) {
-            if (cancelled) continue;
-            try {
-                if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-                if (!report(request.progress, fraction)) cancelled = true;
-            } catch (...) {
-                raised = std::current_exception();
-                cancelled = true;
-            }
-        }
+// Runs a build that Ctrl-C cancels. Its errors name the options as they are named here.
+LevelSet run(Request& request, const std::function<LevelSet(const BuildOptions&)>& job) {
+    return cancellable(request.progress, [&](const Listener& listener) {
+        request.options.progress = listener;
         try {
-            result = running.get();
+            return job(request.options);
         } catch (const std::invalid_argument& error) {
-            if (!raised) raised = std::make_exception_ptr(std::invalid_argument(withOptionNames(error.what())));
-        } catch (...) {
-            if (!raised) raised = std::current_exception();
+            throw std::invalid_argument(withOptionNames(error.what()));
         }
-    }
-    if (!raised && cancelled) raised = std::make_exception_ptr(Cancelled());  // asked for in the last moment
-    if (raised) std::rethrow_exception(raised);
-    report(request.progress, 1);
-    return *result;
+    });
 }
 
 LevelSet buildField(const py::object& object, const py::kwargs& keywords) {
     const SharedMesh mesh = meshOf(object);
     Request request = requestOf(keywords, *mesh, "build");
     const BlockFiller* filler = request.filler ? &*request.filler : nullptr;
-    return watched(request, [&](const BuildOptions& options) { return build(*mesh, options, filler); });
+    return run(request, [&](const BuildOptions& options) { return build(*mesh, options, filler); });
 }
 
 // The triangles of which a corner differs.
@@ -225,7 +183,7 @@ LevelSet rebuildField(const LevelSet& old, const py::object& oldObject, const py
     if (request.filler) throw std::invalid_argument("device: rebuild() runs on the 'cpu'");
     std::vector<std::uint32_t> triangles;
     if (!moved.is_none()) triangles = indices(moved, "moved", 1, after->triangles.size(), "a face");
-    return watched(request, [&, given = !moved.is_none()](const BuildOptions& options) {
+    return run(request, [&, given = !moved.is_none()](const BuildOptions& options) {
         return rebuild(old, *before, *after, given ? triangles : movedTriangles(*before, *after), options);
     });
 }
@@ -294,15 +252,22 @@ numbers of faces, or a face has moved that `moved` does not list.
 True
 )";
 
+constexpr const char* devicesDoc = R"(devices() -> list of dict
+
+The OpenCL devices: platform, name, gpu, compute_units, memory_bytes. Raises DeviceError if a platform fails to answer.
+
+>>> import bilayer
+>>> all(device["memory_bytes"] > 0 for device in bilayer.devices())
+True
+)";
+
 }  // namespace
 
 void addBuild(py::module_& module) {
     module.def("build", buildField, py::arg("mesh"), buildDoc);
     module.def("rebuild", rebuildField, py::arg("level_set"), py::arg("old_mesh"), py::arg("new_mesh"),
                py::arg("moved") = py::none(), rebuildDoc);
-    module.def("devices", listDevices,
-               "devices() -> list of dict\n\nThe OpenCL devices: platform, name, gpu, compute_units, memory_bytes. "
-               "Raises DeviceError if a platform fails to answer.");
+    module.def("devices", listDevices, devicesDoc);
 }
 
 }  // namespace bilayer::python

@@ -13,6 +13,7 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "integration/python/objects.h"
 
 namespace bilayer::python {
 namespace {
@@ -56,12 +57,22 @@ ColliderOptions optionsOf(float pointSpacing, const py::object& margin, const st
     return options;
 }
 
-Collider makeCollider(const py::object& mesh, const LevelSet& levelSet, float pointSpacing, const py::object& margin,
-                      const std::string& accuracy) {
+ColliderObject makeCollider(const py::object& mesh, const LevelSet& levelSet, float pointSpacing,
+                            const py::object& margin, const std::string& accuracy) {
     const SharedMesh shared = meshOf(mesh);
     const ColliderOptions options = optionsOf(pointSpacing, margin, accuracy);
-    const py::gil_scoped_release release;
-    return Collider(*shared, levelSet, options);
+    py::dict keywords;
+    keywords["point_spacing_voxels"] = pointSpacing;
+    keywords["margin"] = margin;
+    keywords["accuracy"] = accuracy;
+    const py::object make =
+        py::module_::import("functools").attr("partial")(py::type::of<ColliderObject>(), **keywords);
+    const py::tuple recipe = py::make_tuple(make, py::make_tuple(shared, levelSet));
+    const auto collider = [&] {
+        const py::gil_scoped_release release;
+        return Collider(*shared, levelSet, options);
+    };
+    return {collider(), recipe};
 }
 
 LevelSet storeBody(const LevelSet& levelSet, const py::object& mesh, float pointSpacing, const py::object& margin,
@@ -72,16 +83,36 @@ LevelSet storeBody(const LevelSet& levelSet, const py::object& mesh, float point
     return withBody(levelSet, *shared, options, keepMesh);
 }
 
-Collider restore(const LevelSet& levelSet) {
+ColliderObject restore(const LevelSet& levelSet) {
+    const py::object make = py::module_::import("operator").attr("methodcaller")("from_level_set", levelSet);
+    const auto collider = [&] {
+        const py::gil_scoped_release release;
+        return Collider(levelSet);
+    };
+    return {collider(), py::make_tuple(make, py::make_tuple(py::type::of<ColliderObject>()))};
+}
+
+// A field of a collider, which pickles as the collider and the attribute's name.
+FieldObject fieldOf(const py::object& self, const Field& (Collider::*member)() const, const char* attribute) {
+    const auto& collider = self.cast<const ColliderObject&>();
+    const auto field = [&] {
+        const py::gil_scoped_release release;
+        return (collider.*member)();
+    };
+    const py::object get = py::module_::import("builtins").attr("getattr");
+    return {field(), py::make_tuple(get, py::make_tuple(self, attribute))};
+}
+
+SharedMesh meshOfCollider(const Collider& collider) {
     const py::gil_scoped_release release;
-    return Collider(levelSet);
+    return std::make_shared<Mesh>(collider.mesh());
 }
 
 constexpr const char* colliderDoc =
     R"(Collider(mesh, level_set, *, point_spacing_voxels=2, margin=None, accuracy="exact-near-features")
 
 The shape of a rigid body for collide() and distance(): a field, surface points and sharp edges. Immutable; share it
-between bodies and threads.
+between bodies and threads. Pickles hold the mesh, the level set and the options.
 
 mesh, level_set: a mesh and the field that build() made of it.
 point_spacing_voxels: distance between neighbouring surface points, in voxels.
@@ -127,30 +158,50 @@ keep_mesh: False stores no mesh; contacts then follow the samples, which round s
 1.0
 )";
 
+constexpr const char* fromLevelSetDoc = R"(from_level_set(level_set) -> Collider
+
+Restores the collider that with_body() stored. Raises ValueError if there is none.
+
+>>> import bilayer
+>>> box = bilayer.box()
+>>> stored = bilayer.with_body(bilayer.build(box, resolution=16), box, margin=0.1)
+>>> round(bilayer.Collider.from_level_set(stored).margin, 3)
+0.1
+)";
+
 }  // namespace
 
 void addCollider(py::module_& module) {
-    py::class_<Collider>(module, "Collider", colliderDoc)
+    py::class_<ColliderObject>(module, "Collider", colliderDoc)
         .def(py::init(&makeCollider), py::arg("mesh"), py::arg("level_set"), py::kw_only(),
              py::arg("point_spacing_voxels") = 2.f, py::arg("margin") = py::none(),
              py::arg("accuracy") = "exact-near-features")
-        .def_static("from_level_set", restore, py::arg("level_set"),
-                    "from_level_set(level_set) -> Collider\n\nRestores the collider that with_body() stored. Raises "
-                    "ValueError if there is none.")
+        .def_static("from_level_set", restore, py::arg("level_set"), fromLevelSetDoc)
         .def_property_readonly(
-            "mesh", [](const Collider& self) { return std::make_shared<Mesh>(self.mesh()); },
+            "mesh", [](const ColliderObject& self) { return meshOfCollider(self); },
             "A copy of the mesh, with all faces outward and holes filled.")
-        .def_property_readonly("field", &Collider::field, py::return_value_policy::copy, "The Field.")
-        .def_property_readonly("exact_field", &Collider::exactField, py::return_value_policy::copy,
-                               "The Field with the mesh, if the body has one.")
-        .def_property_readonly("margin", &Collider::margin, "In the mesh's unit.")
         .def_property_readonly(
-            "mass", [](const Collider& self) { return toResult(self.mass()); },
+            "field", [](const py::object& self) { return fieldOf(self, &Collider::field, "field"); }, "The Field.")
+        .def_property_readonly(
+            "exact_field", [](const py::object& self) { return fieldOf(self, &Collider::exactField, "exact_field"); },
+            "The Field with the mesh, if the body has one.")
+        .def_property_readonly(
+            "margin", [](const ColliderObject& self) { return self.margin(); }, "In the mesh's unit.")
+        .def_property_readonly(
+            "mass",
+            [](const ColliderObject& self) {
+                const auto find = [&] {
+                    const py::gil_scoped_release release;
+                    return self.mass();
+                };
+                return toResult(find());
+            },
             "MassProperties; ValueError if there is no volume.")
-        .def("__copy__", [](const Collider& self) { return self; })
+        .def("__reduce__", [](const ColliderObject& self) { return self.recipe; })
+        .def("__copy__", [](const ColliderObject& self) { return self; })
         .def(
-            "__deepcopy__", [](const Collider& self, const py::dict&) { return self; }, py::arg("memo"))
-        .def("__repr__", [](const Collider& self) {
+            "__deepcopy__", [](const ColliderObject& self, const py::dict&) { return self; }, py::arg("memo"))
+        .def("__repr__", [](const ColliderObject& self) {
             return fmt::format("Collider(voxels of {:g}, margin {:g})", self.field().voxelSize(), self.margin());
         });
     module.def("mass_properties", massOf, py::arg("solid"), massDoc);

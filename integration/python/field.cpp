@@ -2,7 +2,6 @@
 // Field: queries of many points, rays, spheres and boxes at once.
 #include <fmt/format.h>
 
-#include <functional>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <optional>
@@ -14,12 +13,17 @@
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
 #include "sdf/base/unit_tolerance.h"
+#include "integration/python/cancellable.h"
+#include "integration/python/objects.h"
 
 namespace bilayer::python {
 namespace {
 
 constexpr std::array<std::pair<const char*, Storage>, 2> storages{
     {{"float32", Storage::float32}, {"fixed16", Storage::fixed16}}};
+/// Queries of a part of a batch. Closest points are found in groups of 64, which parts must not cut: any of several
+/// equally close features may be the answer, and it must be the library's.
+constexpr std::size_t part = 1024;
 
 // A hit as numpy sees it.
 struct Hit {
@@ -29,27 +33,26 @@ struct Hit {
     std::uint32_t triangle = noTriangle;
 };
 
-py::object sample(const Field& field, const py::object& object) {
+py::object sample(const FieldObject& field, const py::object& object) {
     const Floats points(object, "points", {3});
     std::vector<Sample> samples(points.points().size());
-    {
-        const py::gil_scoped_release release;
-        field.sample(points.points(), samples);
-    }
+    answerInParts(samples.size(), part, [&](std::size_t begin, std::size_t end) {
+        field.sample(points.points().subspan(begin, end - begin), std::span(samples).subspan(begin, end - begin));
+    });
     const Records<Sample> records(std::move(samples), points.shape());
     return result("Samples", records.member(&Sample::distance), records.member(&Sample::gradient),
                   records.member(&Sample::inBand));
 }
 
-py::object closest(const Field& field, const py::object& object, float maxDistance) {
+py::object closest(const FieldObject& field, const py::object& object, float maxDistance) {
     const Floats points(object, "points", {3});
     if (!(maxDistance >= 0))
         throw std::invalid_argument(fmt::format("max_distance is {}, and must be 0 or above", maxDistance));
     std::vector<ClosestPoint> answers(points.points().size());
-    {
-        const py::gil_scoped_release release;
-        field.closest(points.points(), answers, maxDistance);
-    }
+    answerInParts(answers.size(), part, [&](std::size_t begin, std::size_t end) {
+        field.closest(points.points().subspan(begin, end - begin), std::span(answers).subspan(begin, end - begin),
+                      maxDistance);
+    });
     const Records<ClosestPoint> records(std::move(answers), points.shape());
     return result("ClosestPoints", records.member(&ClosestPoint::distance), records.member(&ClosestPoint::position),
                   records.member(&ClosestPoint::normal), records.member(&ClosestPoint::triangle),
@@ -57,27 +60,36 @@ py::object closest(const Field& field, const py::object& object, float maxDistan
                   records.member(&ClosestPoint::found));
 }
 
-// Calls ask(flags) without the GIL for an array of answers of this shape.
-py::object flags(const Shape& shape, const std::function<void(std::span<bool>)>& ask) {
+// An array of the answers of a batch of yes-or-no questions, of this shape. Calls ask(begin, count, answers).
+template <class Ask>
+py::object flags(const Shape& shape, const Ask& ask) {
     py::array_t<bool> array(shape);
-    const std::span<bool> answers(array.mutable_data(), std::size_t(array.size()));
-    {
-        const py::gil_scoped_release release;
-        ask(answers);
-    }
+    bool* const answers = array.mutable_data();
+    answerInParts(std::size_t(array.size()), part, [&](std::size_t begin, std::size_t end) {
+        ask(begin, end - begin, std::span(answers + begin, end - begin));
+    });
     return shape.empty() ? array[py::tuple()] : py::object(array);
 }
 
-py::object inside(const Field& field, const py::object& object) {
+py::object inside(const FieldObject& field, const py::object& object) {
     const Floats points(object, "points", {3});
-    return flags(points.shape(), [&](std::span<bool> answers) { field.inside(points.points(), answers); });
+    return flags(points.shape(), [&](std::size_t begin, std::size_t count, std::span<bool> answers) {
+        field.inside(points.points().subspan(begin, count), answers);
+    });
 }
 
-py::object hitsOf(const std::vector<std::optional<RayHit>>& found, const Shape& shape) {
-    std::vector<Hit> hits(found.size());
-    for (std::size_t i = 0; i < found.size(); ++i)
-        if (const auto& hit = found[i]) hits[i] = {true, hit->distance, hit->position, hit->normal, hit->triangle};
-    const Records<Hit> records(std::move(hits), shape);
+// The hits of a batch of casts, of this shape. Calls cast(begin, count, hits).
+template <class Cast>
+py::object hits(const Shape& shape, std::size_t count, const Cast& cast) {
+    std::vector<Hit> all(count);
+    answerInParts(count, part, [&](std::size_t begin, std::size_t end) {
+        std::vector<std::optional<RayHit>> found(end - begin);
+        cast(begin, end - begin, std::span(found));
+        for (std::size_t i = begin; i < end; ++i)
+            if (const auto& hit = found[i - begin])
+                all[i] = {true, hit->distance, hit->position, hit->normal, hit->triangle};
+    });
+    const Records<Hit> records(std::move(all), shape);
     return result("Hits", records.member(&Hit::hit), records.member(&Hit::distance), records.member(&Hit::position),
                   records.member(&Hit::normal), records.member(&Hit::triangle));
 }
@@ -88,15 +100,16 @@ struct Rays {
           directions(along, "directions", {3}),
           lengths(reach, "max_distance", {}, Range::positiveOrInfinite) {}
 
-    // After broadcasting. Throws std::invalid_argument for a direction of zero length.
-    std::vector<Ray> make() const {
+    // Some rays, after broadcasting. Throws std::invalid_argument for a direction of zero length.
+    std::vector<Ray> make(std::size_t begin, std::size_t count) const {
         const auto from = origins.points(), along = directions.points();
         const auto reach = lengths.as<float>();
-        std::vector<Ray> rays(from.size());
-        for (std::size_t i = 0; i < rays.size(); ++i) {
+        std::vector<Ray> rays(count);
+        for (std::size_t k = 0; k < count; ++k) {
+            const std::size_t i = begin + k;
             if (along[i] == glm::vec3(0))
                 throw std::invalid_argument(fmt::format("directions: direction {} is zero", i));
-            rays[i] = {from[i], along[i], reach[i]};
+            rays[k] = {from[i], along[i], reach[i]};
         }
         return rays;
     }
@@ -104,90 +117,87 @@ struct Rays {
     Floats origins, directions, lengths;
 };
 
-py::object raycast(const Field& field, const py::object& origins, const py::object& directions,
+py::object raycast(const FieldObject& field, const py::object& origins, const py::object& directions,
                    const py::object& maxDistance) {
-    Rays given(origins, directions, maxDistance);
-    const Shape shape = broadcast({&given.origins, &given.directions, &given.lengths});
-    std::vector<std::optional<RayHit>> hits;
-    {
-        const py::gil_scoped_release release;
-        const std::vector<Ray> rays = given.make();
-        hits.resize(rays.size());
-        field.raycast(rays, hits);
-    }
-    return hitsOf(hits, shape);
+    Rays rays(origins, directions, maxDistance);
+    const Shape shape = broadcast({&rays.origins, &rays.directions, &rays.lengths});
+    return hits(shape, rays.origins.points().size(), [&](std::size_t begin, std::size_t count, auto found) {
+        field.raycast(rays.make(begin, count), found);
+    });
 }
 
-py::object sphereCast(const Field& field, const py::object& origins, const py::object& directions,
+py::object sphereCast(const FieldObject& field, const py::object& origins, const py::object& directions,
                       const py::object& radii, const py::object& maxDistance) {
-    Rays given(origins, directions, maxDistance);
+    Rays rays(origins, directions, maxDistance);
     Floats radius(radii, "radii", {}, Range::nonNegative);
-    const Shape shape = broadcast({&given.origins, &given.directions, &radius, &given.lengths});
-    std::vector<std::optional<RayHit>> hits;
-    {
-        const py::gil_scoped_release release;
-        const std::vector<Ray> rays = given.make();
-        hits.resize(rays.size());
-        field.sphereCast(rays, radius.as<float>(), hits);
-    }
-    return hitsOf(hits, shape);
+    const Shape shape = broadcast({&rays.origins, &rays.directions, &radius, &rays.lengths});
+    return hits(shape, rays.origins.points().size(), [&](std::size_t begin, std::size_t count, auto found) {
+        field.sphereCast(rays.make(begin, count), radius.as<float>().subspan(begin, count), found);
+    });
 }
 
-py::object segment(const Field& field, const py::object& start, const py::object& end) {
+py::object segment(const FieldObject& field, const py::object& start, const py::object& end) {
     Floats from(start, "start", {3}), to(end, "end", {3});
     const Shape shape = broadcast({&from, &to});
-    std::vector<std::optional<RayHit>> hits(from.points().size());
-    {
-        const py::gil_scoped_release release;
-        field.segment(from.points(), to.points(), hits);
-    }
-    return hitsOf(hits, shape);
+    return hits(shape, from.points().size(), [&](std::size_t begin, std::size_t count, auto found) {
+        field.segment(from.points().subspan(begin, count), to.points().subspan(begin, count), found);
+    });
 }
 
-py::object overlapsSphere(const Field& field, const py::object& centres, const py::object& radii) {
+py::object overlapsSphere(const FieldObject& field, const py::object& centres, const py::object& radii) {
     Floats centre(centres, "centres", {3}), radius(radii, "radii", {}, Range::nonNegative);
     const Shape shape = broadcast({&centre, &radius});
-    return flags(shape,
-                 [&](std::span<bool> answers) { field.overlapsSphere(centre.points(), radius.as<float>(), answers); });
+    return flags(shape, [&](std::size_t begin, std::size_t count, std::span<bool> answers) {
+        field.overlapsSphere(centre.points().subspan(begin, count), radius.as<float>().subspan(begin, count), answers);
+    });
 }
 
-py::object overlapsBox(const Field& field, const py::object& centres, const py::object& halfSizes,
+py::object overlapsBox(const FieldObject& field, const py::object& centres, const py::object& halfSizes,
                        const py::object& rotations) {
     Floats centre(centres, "centres", {3}), half(halfSizes, "half_sizes", {3}, Range::nonNegative);
     Floats rotation(rotations.is_none() ? py::object(py::make_tuple(1, 0, 0, 0)) : rotations, "rotations", {4});
     const Shape shape = broadcast({&centre, &half, &rotation});
     const auto quaternions = rotation.as<glm::vec4>();
-    std::vector<OrientedBox> boxes(centre.points().size());
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
-        const glm::vec4& q = quaternions[i];
-        if (std::abs(glm::dot(q, q) - 1) > detail::unitTolerance)
-            throw std::invalid_argument(fmt::format("rotations: quaternion {} is not of length 1", i));
-        boxes[i] = {centre.points()[i], half.points()[i], glm::quat(q.x, q.y, q.z, q.w)};  // w, x, y, z
-    }
-    return flags(shape, [&](std::span<bool> answers) { field.overlapsBox(boxes, answers); });
+    return flags(shape, [&](std::size_t begin, std::size_t count, std::span<bool> answers) {
+        std::vector<OrientedBox> boxes(count);
+        for (std::size_t k = 0; k < count; ++k) {
+            const std::size_t i = begin + k;
+            const glm::vec4& q = quaternions[i];
+            if (std::abs(glm::dot(q, q) - 1) > detail::unitTolerance)
+                throw std::invalid_argument(fmt::format("rotations: quaternion {} is not of length 1", i));
+            boxes[k] = {centre.points()[i], half.points()[i], glm::quat(q.x, q.y, q.z, q.w)};  // w, x, y, z
+        }
+        field.overlapsBox(boxes, answers);
+    });
 }
 
-Field makeField(const LevelSet& levelSet, const py::object& mesh, const std::string& storage) {
+FieldObject makeField(const LevelSet& levelSet, const py::object& mesh, const std::string& storage) {
     const FieldOptions options{byWord(storages, storage, "storage")};
-    if (mesh.is_none()) {
+    const SharedMesh shared = mesh.is_none() ? nullptr : meshOf(mesh);
+    const py::tuple recipe = py::make_tuple(py::type::of<FieldObject>(), py::make_tuple(levelSet, shared, storage));
+    const auto make = [&] {
         const py::gil_scoped_release release;
-        return Field(levelSet, options);
-    }
-    const SharedMesh shared = meshOf(mesh);
-    const py::gil_scoped_release release;
-    return Field(levelSet, *shared, options);
+        return shared ? Field(levelSet, *shared, options) : Field(levelSet, options);
+    };
+    return {make(), recipe};
 }
 
-py::object meshOfField(const Field& field) {
+py::object meshOfField(const FieldObject& field) {
     const Mesh* mesh = field.mesh();
     if (!mesh) return py::none();
-    return py::cast(std::make_shared<Mesh>(*mesh));
+    SharedMesh copy;
+    {
+        const py::gil_scoped_release release;
+        copy = std::make_shared<Mesh>(*mesh);
+    }
+    return py::cast(copy);
 }
 
 constexpr const char* fieldDoc = R"(Field(level_set, mesh=None, storage="float32")
 
 A level set laid out for queries, from any number of threads. With its mesh, closest points, rays and inside tests are
-exact; without it they follow the trilinear interpolant.
+exact; without it they follow the trilinear interpolant. Large batches run on all cores, and Ctrl-C cancels them.
+Pickles hold the level set and the mesh.
 
 mesh: the Mesh that the level set was built from, or None.
 storage: "float32", or "fixed16" for half the memory and an error below 5e-5 voxels.
@@ -267,41 +277,87 @@ radii: (...), 0 or above.
 3.5
 )";
 
+constexpr const char* insideDoc = R"(inside(points) -> bool (...)
+
+Whether points (..., 3) are inside; exact with the mesh.
+
+>>> import bilayer
+>>> box = bilayer.box((2, 2, 2))
+>>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
+>>> field.inside([[0, 0, 0.99], [0, 0, 1.01]]).tolist()
+[True, False]
+)";
+
+constexpr const char* segmentDoc = R"(segment(start, end) -> Hits
+
+As raycast(), along segments between points (..., 3). distance is the path length from the start.
+
+>>> import bilayer
+>>> box = bilayer.box((2, 2, 2))
+>>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
+>>> field.segment([5, 0, 0], [[0, 0, 0], [2, 0, 0]]).hit.tolist()
+[True, False]
+)";
+
+constexpr const char* overlapsSphereDoc = R"(overlaps_sphere(centres, radii) -> bool (...)
+
+Whether spheres and the solid overlap. centres: (..., 3); radii: (...), 0 or above.
+
+>>> import bilayer
+>>> box = bilayer.box((2, 2, 2))
+>>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
+>>> field.overlaps_sphere([2, 0, 0], [0.9, 1.1]).tolist()
+[False, True]
+)";
+
+constexpr const char* overlapsBoxDoc = R"(overlaps_box(centres, half_sizes, rotations=None) -> bool (...)
+
+Whether boxes and the solid overlap. centres, half_sizes: (..., 3), half sizes 0 or above; rotations: unit quaternions
+w, x, y, z (..., 4), or None.
+
+>>> import bilayer
+>>> box = bilayer.box((2, 2, 2))
+>>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
+>>> field.overlaps_box([2, 0, 0], [[0.9, 1, 1], [1.1, 1, 1]]).tolist()
+[False, True]
+)";
+
 }  // namespace
 
 void addField(py::module_& module) {
-    py::class_<Field>(module, "Field", fieldDoc)
+    py::class_<FieldObject>(module, "Field", fieldDoc)
         .def(py::init(&makeField), py::arg("level_set"), py::arg("mesh") = py::none(), py::arg("storage") = "float32")
         .def("sample", sample, py::arg("points"), sampleDoc)
         .def("closest", closest, py::arg("points"), py::arg("max_distance") = std::numeric_limits<float>::infinity(),
              closestDoc)
-        .def("inside", inside, py::arg("points"),
-             "inside(points) -> bool (...)\n\nWhether points (..., 3) are inside; exact with the mesh.")
+        .def("inside", inside, py::arg("points"), insideDoc)
         .def("raycast", raycast, py::arg("origins"), py::arg("directions"),
              py::arg("max_distance") = std::numeric_limits<float>::infinity(), raycastDoc)
         .def("sphere_cast", sphereCast, py::arg("origins"), py::arg("directions"), py::arg("radii"),
              py::arg("max_distance") = std::numeric_limits<float>::infinity(), sphereCastDoc)
-        .def("segment", segment, py::arg("start"), py::arg("end"),
-             "segment(start, end) -> Hits\n\nAs raycast(), along segments between points (..., 3).")
-        .def("overlaps_sphere", overlapsSphere, py::arg("centres"), py::arg("radii"),
-             "overlaps_sphere(centres, radii) -> bool (...)\n\nWhether spheres and the solid overlap. centres: (..., "
-             "3); "
-             "radii: (...), 0 or above.")
+        .def("segment", segment, py::arg("start"), py::arg("end"), segmentDoc)
+        .def("overlaps_sphere", overlapsSphere, py::arg("centres"), py::arg("radii"), overlapsSphereDoc)
         .def("overlaps_box", overlapsBox, py::arg("centres"), py::arg("half_sizes"), py::arg("rotations") = py::none(),
-             "overlaps_box(centres, half_sizes, rotations=None) -> bool (...)\n\nWhether boxes and the solid overlap. "
-             "centres, half_sizes: (..., 3); rotations: unit quaternions w, x, y, z (..., 4).")
-        .def_property_readonly("voxel_size", &Field::voxelSize, "Edge of a voxel, in the mesh's unit.")
-        .def_property_readonly("exterior_width", &Field::exteriorWidth, "Width of the band outside.")
-        .def_property_readonly("interior_width", &Field::interiorWidth, "Width of the band inside.")
+             overlapsBoxDoc)
         .def_property_readonly(
-            "bounds", [](const Field& field) { return toArray(field.bounds()); },
+            "voxel_size", [](const FieldObject& self) { return self.voxelSize(); },
+            "Edge of a voxel, in the mesh's unit.")
+        .def_property_readonly(
+            "exterior_width", [](const FieldObject& self) { return self.exteriorWidth(); },
+            "Width of the band outside.")
+        .def_property_readonly(
+            "interior_width", [](const FieldObject& self) { return self.interiorWidth(); }, "Width of the band inside.")
+        .def_property_readonly(
+            "bounds", [](const FieldObject& field) { return toArray(field.bounds()); },
             "float32 of shape (2, 3): of all points in the band.")
         .def_property_readonly("mesh", meshOfField, "A copy of the mesh, with faces outward; None without one.")
-        .def_property_readonly("memory_bytes", &Field::memoryBytes, "Of samples and mesh.")
-        .def("__copy__", [](const Field& self) { return self; })
+        .def_property_readonly(
+            "memory_bytes", [](const FieldObject& self) { return self.memoryBytes(); }, "Of samples and mesh.")
+        .def("__reduce__", [](const FieldObject& self) { return self.recipe; })
+        .def("__copy__", [](const FieldObject& self) { return self; })
         .def(
-            "__deepcopy__", [](const Field& self, const py::dict&) { return self; }, py::arg("memo"))
-        .def("__repr__", [](const Field& self) {
+            "__deepcopy__", [](const FieldObject& self, const py::dict&) { return self; }, py::arg("memo"))
+        .def("__repr__", [](const FieldObject& self) {
             return fmt::format("Field(voxels of {:g}, {} mesh)", self.voxelSize(), self.mesh() ? "with" : "without");
         });
 }

@@ -4,8 +4,8 @@
 #include <openvdb/tools/Dense.h>
 
 #include <cmath>
+#include <functional>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 
 #include <bilayer/integration/fluid/obstacle.h>
@@ -16,6 +16,9 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "integration/python/cancellable.h"
+#include "integration/python/grid_bytes.h"
+#include "integration/python/objects.h"
 
 namespace bilayer::python {
 namespace {
@@ -42,27 +45,36 @@ void dropHistory(openvdb::FloatGrid& liquid) {
     for (const std::string& name : names) liquid.removeMeta(name);
 }
 
-// Calls visit(LevelSet or Mesh) without the GIL.
-template <class Visit>
-auto withSolid(const py::object& solid, Visit visit) {
-    if (py::isinstance<LevelSet>(solid)) {
-        const auto& levelSet = solid.cast<const LevelSet&>();
-        const py::gil_scoped_release release;
-        return visit(levelSet);
+// A LevelSet, or a mesh of any kind.
+class SolidArgument {
+  public:
+    explicit SolidArgument(const py::object& solid)
+        : levelSet_(py::isinstance<LevelSet>(solid) ? solid.cast<const LevelSet*>() : nullptr),
+          mesh_(levelSet_ ? nullptr : meshOf(solid)) {}
+
+    /// visit(LevelSet) or visit(Mesh); needs no GIL.
+    template <class Visit>
+    auto visit(const Visit& visit) const {
+        return levelSet_ ? visit(*levelSet_) : visit(static_cast<const Mesh&>(*mesh_));
     }
-    const SharedMesh mesh = meshOf(solid);
-    const py::gil_scoped_release release;
-    return visit(static_cast<const Mesh&>(*mesh));
-}
+
+  private:
+    const LevelSet* levelSet_;
+    SharedMesh mesh_;
+};
 
 py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::object& pose, const py::object& scale,
                       const std::string& mode, bool uniteSolids) {
     const fluid::Placement placement = placementOf(pose, scale);
-    const fluid::SeedOptions options(byWord(modes, mode, "mode"), uniteSolids);
-    const openvdb::FloatGrid::Ptr grid = liquid.grids().distance->deepCopy();
-    dropHistory(*grid);
-    const auto [maxChange, where, changedVoxels] =
-        withSolid(body, [&](const auto& solid) { return fluid::seed(*grid, solid, placement, options); });
+    fluid::SeedOptions options(byWord(modes, mode, "mode"), uniteSolids);
+    const SolidArgument solid(body);
+    openvdb::FloatGrid::Ptr grid;
+    const auto [maxChange, where, changedVoxels] = cancellable(py::none(), [&](const Listener& listener) {
+        options.progress = listener;
+        grid = liquid.grids().distance->deepCopy();
+        dropHistory(*grid);
+        return solid.visit([&](const auto& one) { return fluid::seed(*grid, one, placement, options); });
+    });
     auto grids = std::make_shared<Grids>();
     grids->distance = grid;
     return result("Seeded", LevelSet(std::move(grids)), maxChange, toArray(where), changedVoxels);
@@ -70,25 +82,28 @@ py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::
 
 py::object makeParticles(const py::object& liquid, const py::object& pose, const py::object& scale,
                          const py::object& voxelSize, int perVoxel, std::uint64_t seed) {
-    const fluid::ParticleOptions options{.perVoxel = perVoxel, .seed = seed};
-    fluid::Particles particles;
+    fluid::ParticleOptions options{.perVoxel = perVoxel, .seed = seed};
+    std::function<fluid::Particles()> make;
     if (py::isinstance<LevelSet>(liquid)) {
         if (!pose.is_none() || !voxelSize.is_none())
             throw std::invalid_argument("pose and voxel_size are for a Field; a LevelSet has its own voxels");
         const auto& levelSet = liquid.cast<const LevelSet&>();
-        const py::gil_scoped_release release;
-        particles = fluid::particles(*levelSet.grids().distance, options);
-    } else if (py::isinstance<Field>(liquid)) {
-        const auto& field = liquid.cast<const Field&>();
+        make = [&] { return fluid::particles(*levelSet.grids().distance, options); };
+    } else if (py::isinstance<FieldObject>(liquid)) {
+        const auto& field = liquid.cast<const FieldObject&>();
         const double edge = voxelSize.is_none() ? double(field.voxelSize()) : voxelSize.cast<double>();
         requirePositive(edge, "voxel_size");
-        const fluid::Placement placement = placementOf(pose, scale);
-        const py::gil_scoped_release release;
-        particles = fluid::particles(field, placement, *Transform::createLinearTransform(edge), options);
+        make = [&options, &field, placement = placementOf(pose, scale), edge] {
+            return fluid::particles(field, placement, *Transform::createLinearTransform(edge), options);
+        };
     } else {
         throw std::invalid_argument(
             fmt::format("liquid: expected a LevelSet or a Field, got a '{}'", Py_TYPE(liquid.ptr())->tp_name));
     }
+    fluid::Particles particles = cancellable(py::none(), [&](const Listener& listener) {
+        options.progress = listener;
+        return make();
+    });
     const auto count = py::ssize_t(particles.positions.size());
     glm::vec3* first = nullptr;
     const py::capsule owner = owned(std::move(particles.positions), first);
@@ -99,14 +114,13 @@ py::object makeParticles(const py::object& liquid, const py::object& pose, const
 class Obstacle {
   public:
     explicit Obstacle(fluid::Solid solid) : solid_(std::move(solid)) {
-        for (const openvdb::GridBase* grid : {static_cast<const openvdb::GridBase*>(solid_.distance.get()),
-                                              static_cast<const openvdb::GridBase*>(solid_.velocity.get()),
-                                              static_cast<const openvdb::GridBase*>(solid_.openFaces.get()),
-                                              static_cast<const openvdb::GridBase*>(solid_.openVolume.get())})
-            box_.expand(grid->evalActiveVoxelBoundingBox());
+        for (const auto& grid : grids()) box_.expand(grid->evalActiveVoxelBoundingBox());
     }
 
     const fluid::Solid& solid() const { return solid_; }
+    openvdb::GridCPtrVec grids() const {
+        return {solid_.distance, solid_.velocity, solid_.openFaces, solid_.openVolume};
+    }
     double voxelSize() const { return solid_.distance->voxelSize()[0]; }
     glm::dvec3 origin() const {
         const openvdb::Vec3d place = solid_.distance->indexToWorld(box_.min());
@@ -133,7 +147,7 @@ class Obstacle {
     void save(const py::object& path) const {
         const std::string file = pathOf(path);
         const py::gil_scoped_release release;
-        writeGrids(file, {solid_.distance, solid_.velocity, solid_.openFaces, solid_.openVolume});
+        writeGrids(file, grids());
     }
 
   private:
@@ -145,18 +159,31 @@ Obstacle makeObstacle(const py::object& solid, double voxelSize, const py::objec
                       const py::object& velocity, const py::object& angularVelocity, float halfWidth) {
     requirePositive(voxelSize, "voxel_size");
     const fluid::Placement placement = placementOf(pose, scale);
-    const fluid::SolidOptions options{
-        .velocity = {vector(velocity, "velocity"), vector(angularVelocity, "angular_velocity")},
-        .halfWidthVoxels = halfWidth};
-    return withSolid(solid, [&](const auto& body) {
+    fluid::SolidOptions options{.velocity = {vector(velocity, "velocity"), vector(angularVelocity, "angular_velocity")},
+                                .halfWidthVoxels = halfWidth};
+    const SolidArgument body(solid);
+    return cancellable(py::none(), [&](const Listener& listener) {
+        options.progress = listener;
         openvdb::initialize();
-        return Obstacle(fluid::solid(body, placement, *Transform::createLinearTransform(voxelSize), options));
+        return body.visit([&](const auto& one) {
+            return Obstacle(fluid::solid(one, placement, *Transform::createLinearTransform(voxelSize), options));
+        });
     });
+}
+
+// The obstacle of grids in the order of Obstacle::grids().
+Obstacle restored(const py::bytes& bytes) {
+    const openvdb::GridPtrVec grids = gridsOf(bytes);
+    if (grids.size() != 4) throw std::invalid_argument("an obstacle has 4 grids");
+    return Obstacle(
+        {openvdb::gridPtrCast<openvdb::FloatGrid>(grids[0]), openvdb::gridPtrCast<openvdb::Vec3SGrid>(grids[1]),
+         openvdb::gridPtrCast<openvdb::Vec3SGrid>(grids[2]), openvdb::gridPtrCast<openvdb::FloatGrid>(grids[3])});
 }
 
 constexpr const char* seedDoc = R"(seed(liquid, body, pose=None, scale=1, mode="unite", unite_solids=True) -> Seeded
 
 Combines a body with a liquid's level set, in the liquid's voxels. The result passes OpenVDB's check of level sets.
+Ctrl-C cancels.
 
 liquid: a LevelSet with a band of 3 voxels or more on each side.
 body: a mesh or a LevelSet. pose: a Pose, a matrix of shape (4, 4), or None. scale: one number or three, above 0.
@@ -178,6 +205,7 @@ constexpr const char* particlesDoc =
     R"(particles(liquid, pose=None, scale=1, voxel_size=None, per_voxel=8, seed=0) -> float32 (N, 3)
 
 Marker particles at jittered positions inside a liquid; none outside. The same seed gives the same particles.
+Ctrl-C cancels.
 
 liquid: a LevelSet, or a Field in a pose, whose mesh keeps particles from passing thin walls.
 voxel_size: of the solver's grid, for a Field; None for the field's own.
@@ -194,6 +222,7 @@ constexpr const char* obstacleDoc =
          half_width_voxels=3) -> Obstacle
 
 What a pressure solver needs of a moving body, in cells whose centres are at whole multiples of voxel_size.
+Ctrl-C cancels.
 
 solid: a mesh or a LevelSet. pose, scale: as for seed().
 velocity: [unit/s]. angular_velocity: [rad/s], about the pose's position.
@@ -204,6 +233,15 @@ Raises ValueError for a body that is open or without an inside.
 >>> obstacle = bilayer.obstacle(bilayer.sphere(1), 0.1)
 >>> float(obstacle.open_volume.min()), obstacle.velocity.shape[3]
 (0.0, 3)
+)";
+
+constexpr const char* saveDoc = R"(save(path)
+
+Writes the four grids to a .vdb file, whole or not at all. Raises RuntimeError if it cannot be written.
+
+>>> import bilayer, os, tempfile
+>>> with tempfile.TemporaryDirectory() as folder:
+...     bilayer.obstacle(bilayer.sphere(1), 0.1).save(os.path.join(folder, "solid.vdb"))
 )";
 
 }  // namespace
@@ -228,8 +266,11 @@ void addFluid(py::module_& module) {
             "origin", [](const Obstacle& self) { return toArray(self.origin()); },
             "float64 (3,): world coordinates of the centre of cell [0, 0, 0].")
         .def_property_readonly("voxel_size", &Obstacle::voxelSize, "Edge of a cell.")
-        .def("save", &Obstacle::save, py::arg("path"),
-             "save(path)\n\nWrites the four grids to a .vdb file, whole or not at all.");
+        .def("save", &Obstacle::save, py::arg("path"), saveDoc)
+        .def("__copy__", [](const Obstacle& self) { return self; })
+        .def(
+            "__deepcopy__", [](const Obstacle& self, const py::dict&) { return self; }, py::arg("memo"))
+        .def(py::pickle([](const Obstacle& self) { return bytesOf(self.grids()); }, &restored));
     module.def("seed", seedLiquid, py::arg("liquid"), py::arg("body"), py::arg("pose") = py::none(),
                py::arg("scale") = 1, py::arg("mode") = "unite", py::arg("unite_solids") = true, seedDoc);
     module.def("particles", makeParticles, py::arg("liquid"), py::arg("pose") = py::none(), py::arg("scale") = 1,

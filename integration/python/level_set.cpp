@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // LevelSet: metadata, files, conversion to numpy, isosurfaces, extension beyond the band.
 #include <fmt/format.h>
-#include <openvdb/io/Stream.h>
-#include <openvdb/tools/Dense.h>
 #include <openvdb/tree/LeafManager.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
 #include <cmath>
-#include <istream>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 
 #include <bilayer/integration/fluid/extend.h>
@@ -23,6 +19,8 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "integration/python/dense.h"
+#include "integration/python/grid_bytes.h"
 
 namespace bilayer::python {
 namespace {
@@ -31,30 +29,9 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 
-constexpr double maxDenseVoxels = 1u << 31;  // 8 GiB; a finer field wants sparse()
-
 glm::dvec3 worldOf(const LevelSet& levelSet, const Coord& voxel) {
     const openvdb::Vec3d place = levelSet.grids().distance->indexToWorld(voxel);
     return levelSet.origin() + glm::dvec3(place.x(), place.y(), place.z());
-}
-
-py::object dense(const LevelSet& levelSet, int padding) {
-    if (padding < 0) throw std::invalid_argument(fmt::format("padding is {}, and must be 0 or above", padding));
-    const FloatGrid& grid = *levelSet.grids().distance;
-    openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
-    box.expand(padding);
-    const Coord size = box.dim();
-    if (double(size.x()) * size.y() * size.z() > maxDenseVoxels)
-        throw std::invalid_argument(fmt::format(
-            "a dense array of {} x {} x {} voxels is larger than 8 GiB: use sparse()", size.x(), size.y(), size.z()));
-    py::array_t<float> values({size.x(), size.y(), size.z()});
-    float* const memory = values.mutable_data();
-    {
-        const py::gil_scoped_release release;
-        openvdb::tools::Dense<float, openvdb::tools::LayoutZYX> target(box, memory);
-        openvdb::tools::copyToDense(grid, target);
-    }
-    return result("Dense", values, toArray(worldOf(levelSet, box.min())), levelSet.voxelSize());
 }
 
 // The tree with voxels in place of active tiles, which fields of other programs may have.
@@ -135,31 +112,18 @@ py::dict metadataOf(const LevelSet& levelSet) {
     return all;
 }
 
-// The grids as they are in memory, for pickles. Files hold them shifted by the origin.
 py::bytes packed(const LevelSet& levelSet) {
-    std::string bytes;
-    {
-        const py::gil_scoped_release release;
-        openvdb::initialize();
-        const Grids& grids = levelSet.grids();
-        openvdb::GridCPtrVec all{grids.distance};
-        if (grids.triangle) all.push_back(grids.triangle);
-        if (grids.points) all.push_back(grids.points);
-        std::ostringstream stream(std::ios::binary);
-        openvdb::io::Stream(stream).write(all);
-        bytes = std::move(stream).str();
-    }
-    return bytes;
+    const Grids& grids = levelSet.grids();
+    openvdb::GridCPtrVec all{grids.distance};
+    if (grids.triangle) all.push_back(grids.triangle);
+    if (grids.points) all.push_back(grids.points);
+    return bytesOf(all);
 }
 
 LevelSet unpacked(const py::bytes& packed) {
-    const auto view = packed.cast<std::string>();
-    const py::gil_scoped_release release;
-    openvdb::initialize();
-    std::istringstream stream(view, std::ios::binary);
-    const openvdb::GridPtrVecPtr all = openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
+    const openvdb::GridPtrVec all = gridsOf(packed);
     auto grids = std::make_shared<Grids>();
-    for (const auto& grid : *all) {
+    for (const auto& grid : all) {
         if (grid->getName() == contactPoints)
             grids->points = grid;
         else if (grid->isType<openvdb::Int32Grid>())
@@ -167,6 +131,7 @@ LevelSet unpacked(const py::bytes& packed) {
         else
             grids->distance = openvdb::gridPtrCast<FloatGrid>(grid);
     }
+    const py::gil_scoped_release release;
     return LevelSet(std::move(grids));
 }
 
@@ -235,6 +200,27 @@ Raises ValueError for more than 2^31 voxels.
 ((23, 23, 23), True)
 )";
 
+constexpr const char* fromDenseDoc =
+    R"(from_numpy(values, origin=(0, 0, 0), spacing=1, *, half_width=None, field_origin=(0, 0, 0)) -> LevelSet
+
+The level set of a dense array of signed distances, as to_numpy() returns it. Voxels beyond the band are dropped.
+
+values: real numbers of shape (nx, ny, nz), negative inside, in the unit of the spacing.
+origin: three numbers, the centre of values[0, 0, 0]. spacing: distance of neighbouring voxels, above 0.
+half_width: width of the band in the unit of the spacing, or a pair for outside and inside; None for the smallest value
+at the border of the array, and minus the smallest value.
+field_origin: LevelSet.origin, to which queries are relative; `origin` must be a whole number of voxels from it.
+
+Raises ValueError that names the argument for a wrong shape or dtype and values that are not finite; if no value is
+negative; if the solid or the band reaches the border; and for values that are no distances: that differ by more than
+1.5 spacings between neighbours, or do not change by about a spacing across the surface.
+
+>>> import bilayer
+>>> level_set = bilayer.build(bilayer.box(), resolution=16)
+>>> bilayer.LevelSet.from_numpy(*level_set.to_numpy()) == level_set
+True
+)";
+
 constexpr const char* sparseDoc = R"(sparse() -> Sparse(coordinates, values, triangles, origin, spacing)
 
 The active voxels, in the order of the tree.
@@ -284,6 +270,24 @@ or not at all.
 half_float: store distances as 16-bit floats, half the size, with three decimal digits.
 
 Raises ValueError for another extension, RuntimeError if the file cannot be written.
+
+>>> import bilayer, os, tempfile
+>>> with tempfile.TemporaryDirectory() as folder:
+...     bilayer.build(bilayer.box(), resolution=16).save(os.path.join(folder, "box.nvdb"))
+)";
+
+constexpr const char* loadDoc = R"(load(path) -> LevelSet
+
+Reads the first level set of a .vdb file, of bilayer or another program.
+
+Raises FileNotFoundError, and RuntimeError that names the file if it cannot be read.
+
+>>> import bilayer, os, tempfile
+>>> with tempfile.TemporaryDirectory() as folder:
+...     path = os.path.join(folder, "box.vdb")
+...     bilayer.build(bilayer.box(), resolution=16).save(path)
+...     bilayer.LevelSet.load(path).method
+'exact'
 )";
 
 }  // namespace
@@ -310,15 +314,15 @@ void addLevelSet(py::module_& module) {
             "has_triangles", [](const LevelSet& self) { return self.grids().triangle != nullptr; },
             "Whether the nearest face of each active voxel is stored.")
         .def_property_readonly("metadata", metadataOf, "All of the above, and more, by name.")
-        .def("to_numpy", dense, py::arg("padding") = 1, denseDoc)
+        .def("to_numpy", toDense, py::arg("padding") = 1, denseDoc)
+        .def_static("from_numpy", fromDense, py::arg("values"), py::arg("origin") = py::make_tuple(0, 0, 0),
+                    py::arg("spacing") = 1.0, py::kw_only(), py::arg("half_width") = py::none(),
+                    py::arg("field_origin") = py::make_tuple(0, 0, 0), fromDenseDoc)
         .def("sparse", sparse, sparseDoc)
         .def("surface", extract, py::arg("isovalue") = 0.f, py::arg("adaptivity") = 0.f, surfaceDoc)
         .def("extended", extended, py::arg("distance") = py::none(), extendedDoc)
         .def("save", save, py::arg("path"), py::arg("half_float") = false, saveDoc)
-        .def_static(
-            "load", load, py::arg("path"),
-            "load(path) -> LevelSet\n\nReads the first level set of a .vdb file, of bilayer or another program. "
-            "Raises FileNotFoundError, and RuntimeError that names the file if it cannot be read.")
+        .def_static("load", load, py::arg("path"), loadDoc)
         .def(
             "__eq__",
             [](const LevelSet& a, const LevelSet& b) {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <glm/mat4x4.hpp>
-#include <optional>
 #include <stdexcept>
 
 #include <bilayer/sdf/inspect.h>
@@ -14,6 +13,7 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "integration/python/cancellable.h"
 
 namespace bilayer::python {
 namespace {
@@ -43,17 +43,19 @@ Mesh makeMesh(const py::object& vertices, const py::object& faces, const py::obj
         throw std::invalid_argument(fmt::format(
             "vertices: expected an array of real numbers of shape (N, 3), got {} points", text(points.shape())));
     requireNear(vertices);
-    Mesh mesh;
     const auto span = points.points();
-    mesh.points.assign(span.begin(), span.end());
     const std::vector<std::uint32_t> corners = indices(faces, "faces", 3, span.size(), "a vertex");
+    Mesh mesh;
+    if (!origin.is_none()) mesh.origin = doubleVector(origin, "origin");
+    const py::gil_scoped_release release;
+    mesh.points.assign(span.begin(), span.end());
     mesh.triangles.resize(corners.size() / 3);
     if (!corners.empty()) std::memcpy(mesh.triangles.data(), corners.data(), corners.size() * sizeof(std::uint32_t));
-    if (!origin.is_none()) mesh.origin = doubleVector(origin, "origin");
     return mesh;
 }
 
 bool equal(const Mesh& a, const Mesh& b) {
+    const py::gil_scoped_release release;
     return a.points == b.points && a.triangles == b.triangles && a.origin == b.origin;
 }
 
@@ -103,12 +105,8 @@ py::object inspectMesh(const py::object& object, double wall) {
     const SharedMesh mesh = meshOf(object);
     if (!(wall >= 0) || !std::isfinite(wall))
         throw std::invalid_argument(fmt::format("wall is {}, and must be 0 or above", wall));
-    std::optional<MeshReport> report;
-    {
-        const py::gil_scoped_release release;
-        report = inspect(*mesh, float(wall));
-    }
-    return toReport(*report);
+    return toReport(
+        cancellable(py::none(), [&](const Listener& listener) { return inspect(*mesh, float(wall), listener); }));
 }
 
 SharedMesh read(const py::object& path) {
@@ -143,7 +141,7 @@ range; also for float64 coordinates so far from zero that float32 would round th
 
 constexpr const char* inspectDoc = R"(inspect(mesh, wall=0) -> MeshReport
 
-Counts the defects of a mesh. Vertices with equal coordinates count as one.
+Counts the defects of a mesh. Vertices with equal coordinates count as one. Ctrl-C cancels.
 
 wall: walls thinner than this count as thin, in the mesh's unit; 0 counts none.
 
@@ -168,6 +166,38 @@ that are not finite.
 ...     bilayer.box().save(path)
 ...     bilayer.read_mesh(path)
 Mesh(8 vertices, 12 faces)
+)";
+
+constexpr const char* weldedDoc = R"(welded() -> Mesh
+
+Merges vertices with equal coordinates, and drops collapsed faces and unused vertices.
+
+>>> import bilayer
+>>> two = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+>>> bilayer.Mesh(two, [[0, 1, 2], [3, 4, 5]]).welded()
+Mesh(4 vertices, 2 faces)
+)";
+
+constexpr const char* transformedDoc = R"(transformed(matrix) -> Mesh
+
+Applies an affine map, real numbers of shape (4, 4). A reflection also flips the faces.
+
+Raises ValueError for another shape or last row.
+
+>>> import bilayer
+>>> bilayer.box().transformed([[2, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]).bounds[:, 0].tolist()
+[0.0, 2.0]
+)";
+
+constexpr const char* saveDoc = R"(save(path)
+
+Writes an .obj, .ply or .stl file, whole or not at all.
+
+Raises ValueError for another extension and RuntimeError if the file cannot be written.
+
+>>> import bilayer, os, tempfile
+>>> with tempfile.TemporaryDirectory() as folder:
+...     bilayer.box().save(os.path.join(folder, "box.obj"))
 )";
 
 }  // namespace
@@ -198,7 +228,14 @@ void addMesh(py::module_& module) {
             "origin", [](const Mesh& mesh) { return toArray(mesh.origin); },
             "float64 of shape (3,): world coordinates are vertices plus this.")
         .def_property_readonly(
-            "bounds", [](const Mesh& mesh) { return toArray(bounds(mesh)); },
+            "bounds",
+            [](const Mesh& mesh) {
+                const auto find = [&] {
+                    const py::gil_scoped_release release;
+                    return bounds(mesh);
+                };
+                return toArray(find());
+            },
             "float32 of shape (2, 3): lower and upper corner of all vertices that faces use.")
         .def(
             "welded",
@@ -206,17 +243,16 @@ void addMesh(py::module_& module) {
                 const py::gil_scoped_release release;
                 return std::make_shared<Mesh>(weld(mesh));
             },
-            "welded() -> Mesh\n\nMerges vertices with equal coordinates, and drops collapsed faces and unused "
-            "vertices.")
-        .def("transformed", transform, py::arg("matrix"),
-             "transformed(matrix) -> Mesh\n\nApplies an affine map, real numbers of shape (4, 4). A reflection also "
-             "flips the faces.")
-        .def("save", write, py::arg("path"),
-             "save(path)\n\nWrites an .obj, .ply or .stl file, whole or not at all. Raises ValueError for another "
-             "extension and RuntimeError if the file cannot be written.")
+            weldedDoc)
+        .def("transformed", transform, py::arg("matrix"), transformedDoc)
+        .def("save", write, py::arg("path"), saveDoc)
         .def(
             "__eq__", [](const Mesh& a, const Mesh& b) { return equal(a, b); }, py::is_operator())
-        .def("__hash__", [](const Mesh& mesh) { return py::ssize_t(hash(mesh) >> 1); })
+        .def("__hash__",
+             [](const Mesh& mesh) {
+                 const py::gil_scoped_release release;
+                 return py::ssize_t(hash(mesh) >> 1);
+             })
         .def("__copy__", [](const py::object& self) { return self; })
         .def(
             "__deepcopy__", [](const py::object& self, const py::dict&) { return self; }, py::arg("memo"))

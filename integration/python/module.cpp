@@ -25,5 +25,6 @@ PYBIND11_MODULE(_bilayer, module) {
     python::addPose(module);
     python::addCollider(module);
     python::addContact(module);
+    python::addDistance(module);
     python::addFluid(module);
 }

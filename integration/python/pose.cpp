@@ -86,6 +86,33 @@ Where functions take a pose, they also take a matrix of shape (4, 4), or None fo
 [1.0, 2.0, 4.0]
 )";
 
+constexpr const char* fromMatrixDoc = R"(from_matrix(matrix) -> Pose
+
+Of a matrix of shape (4, 4). Raises ValueError for one with a scale.
+
+>>> import bilayer, numpy
+>>> bilayer.Pose.from_matrix(numpy.eye(4)) == bilayer.Pose()
+True
+)";
+
+constexpr const char* toWorldDoc = R"(to_world(points) -> float32 (..., 3)
+
+Maps points (..., 3) of the body to the world.
+
+>>> import bilayer
+>>> bilayer.Pose((1, 2, 3)).to_world([[0, 0, 0], [1, 0, 0]]).tolist()
+[[1.0, 2.0, 3.0], [2.0, 2.0, 3.0]]
+)";
+
+constexpr const char* toBodyDoc = R"(to_body(points) -> float32 (..., 3)
+
+Maps points (..., 3) of the world to the body.
+
+>>> import bilayer
+>>> bilayer.Pose((1, 2, 3)).to_body([1, 2, 4]).tolist()
+[0.0, 0.0, 1.0]
+)";
+
 }  // namespace
 
 void addPose(py::module_& module) {
@@ -94,7 +121,7 @@ void addPose(py::module_& module) {
              py::arg("rotation") = py::make_tuple(1, 0, 0, 0))
         .def_static(
             "from_matrix", [](const py::object& matrix) { return poseOf(matrix, "matrix"); }, py::arg("matrix"),
-            "from_matrix(matrix) -> Pose\n\nOf a matrix of shape (4, 4). Raises ValueError for one with a scale.")
+            fromMatrixDoc)
         .def_property_readonly(
             "position", [](const Pose& pose) { return toArray(pose.position); }, "float32 of shape (3,).")
         .def_property_readonly("rotation", rotationOf, "float32 of shape (4,): a unit quaternion w, x, y, z.")
@@ -104,13 +131,13 @@ void addPose(py::module_& module) {
             [](const Pose& pose, const py::object& points) {
                 return mapped(points, [&](const glm::vec3& point) { return pose.toWorld(point); });
             },
-            py::arg("points"), "to_world(points) -> float32 (..., 3)\n\nMaps points (..., 3) of the body to the world.")
+            py::arg("points"), toWorldDoc)
         .def(
             "to_body",
             [](const Pose& pose, const py::object& points) {
                 return mapped(points, [&](const glm::vec3& point) { return pose.toBody(point); });
             },
-            py::arg("points"), "to_body(points) -> float32 (..., 3)\n\nMaps points (..., 3) of the world to the body.")
+            py::arg("points"), toBodyDoc)
         .def(
             "__eq__", [](const Pose& a, const Pose& b) { return a.position == b.position && a.rotation == b.rotation; },
             py::is_operator())

@@ -1,22 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 // usage: test_python_answers MESH VOXEL_SIZE POINTS ANSWERS
-// The library's answers to the float32 points of a file, without Python: samples, closest points, contacts of the body
-// with itself one voxel aside, distance of the body from itself, three units along x. All are written as float32.
+// The library's answers to the float32 points of a file, without Python: samples, closest points, rays from each point
+// to zero, sphere casts of radius 0.1 along them, inside tests; contacts of the body with itself one voxel aside,
+// distance of the body from itself, three units along x, and the time of impact on the way back; volume and particles
+// of the field. All are written as float32.
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
 #include <iterator>
+#include <limits>
 #include <span>
 #include <vector>
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/collider/distance.h>
+#include <bilayer/collider/mass.h>
+#include <bilayer/integration/fluid/particles.h>
 #include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 
 using namespace bilayer;
 
 namespace {
+
+constexpr float infinite = std::numeric_limits<float>::infinity();
 
 class FloatFile {
   public:
@@ -48,12 +56,21 @@ void answer(const Mesh& mesh, float voxelSize, const std::vector<glm::vec3>& poi
     field.closest(points, closest);
     for (const ClosestPoint& point : closest)
         file.add(point.distance), file.add(point.position), file.add(point.normal);
+    for (const glm::vec3& point : points) {
+        const Ray ray{point, -point};
+        const auto hit = field.raycast(ray), sphere = field.sphereCast(ray, 0.1f);
+        file.add(hit ? hit->distance : infinite), file.add(sphere ? sphere->distance : infinite);
+        file.add(hit && hit->triangle != noTriangle ? float(hit->triangle) : -1), file.add(field.inside(point));
+    }
     const Collider collider(mesh, levelSet);
     std::vector<Contact> contacts;
     collide(collider, Pose{{voxelSize, 0, 0}}, collider, Pose{}, {.margin = voxelSize}, contacts);
     for (const Contact& contact : contacts)
         file.add(contact.position), file.add(contact.normal), file.add(contact.distance);
     file.add(distance({collider, {{3, 0, 0}}}, {collider, {}}).distance);
+    file.add(timeOfImpact({collider, {{3, 0, 0}}, 1, {{-3, 0, 0}, {0, 0, 1}}}, {collider, {}}).fraction);
+    file.add(float(massProperties(levelSet).volume));
+    for (const glm::vec3& point : fluid::particles(*levelSet.grids().distance).positions) file.add(point);
 }
 
 }  // namespace

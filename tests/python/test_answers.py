@@ -22,13 +22,18 @@ def answers_here(mesh, points):
     closest = field.closest(points)
     collider = bilayer.Collider(mesh, level_set)
     contacts = bilayer.collide(collider, bilayer.Pose((VOXEL_SIZE, 0, 0)), collider, None, margin=VOXEL_SIZE)
-    apart = bilayer.distance(collider, bilayer.Pose((3, 0, 0)), collider, None)
+    there = bilayer.Pose((3, 0, 0))
+    apart = bilayer.distance(collider, there, collider, None)
+    impact = bilayer.time_of_impact(collider, there, [[-3, 0, 0], [0, 0, 1]], collider, None, None)
+    hits, spheres = field.raycast(points, -points), field.sphere_cast(points, -points, 0.1)
     return np.concatenate(
         [
             np.column_stack([samples.distance, samples.gradient]).ravel(),
             np.column_stack([closest.distance, closest.position, closest.normal]).ravel(),
+            np.column_stack([hits.distance, spheres.distance, hits.triangle, field.inside(points)]).ravel(),
             np.column_stack([contacts.position, contacts.normal, contacts.distance]).ravel(),
-            np.float32([apart.distance]),
+            np.float32([apart.distance, impact.fraction, bilayer.mass_properties(level_set).volume]),
+            bilayer.particles(level_set).ravel(),
         ]
     )
 
@@ -43,5 +48,5 @@ def test_to_the_bit(tmp_path, random, shape):
     points.tofile(points_path)
     subprocess.run([PROGRAM, path, str(VOXEL_SIZE), points_path, answers_path], check=True)
     here, there = answers_here(bilayer.read_mesh(path), points), np.fromfile(answers_path, dtype=np.float32)
-    assert here.dtype == np.float32 and here.size > 11 * len(points)
-    assert here.tobytes() == there.tobytes()
+    assert here.size > 11 * len(points)
+    assert here.astype(np.float32).tobytes() == there.tobytes()

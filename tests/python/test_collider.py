@@ -71,6 +71,28 @@ def test_collider(box, box_set, collider, sphere):
         bilayer.Collider.from_level_set(box_set)
 
 
+def test_colliders_pickle(box, box_set, sphere):
+    cut = bilayer.Mesh(sphere.vertices, sphere.faces[: -len(sphere.faces) // 50])
+    holed = bilayer.build(cut, resolution=24)
+    bodies = [
+        bilayer.Collider(box, box_set, point_spacing_voxels=1.7, margin=0.2, accuracy="exact"),
+        bilayer.Collider(box, box_set, accuracy="samples"),
+        bilayer.Collider(cut, holed),
+        bilayer.Collider.from_level_set(bilayer.with_body(box_set, box, margin=0.3, keep_mesh=False)),
+    ]
+    points = np.random.default_rng(1).uniform(-1.5, 1.5, size=(500, 3))
+    for body in bodies:
+        again = pickle.loads(pickle.dumps(body))
+        assert again.margin == body.margin and again.mesh == body.mesh
+        above = bilayer.Pose((0.1, 0, 1.97))
+        here, there = (bilayer.collide(one, above, one, None, margin=0.1) for one in (body, again))
+        assert len(here.distance) > 0 and all(np.array_equal(a, b) for a, b in zip(here, there))
+        for name in ("field", "exact_field"):
+            field, pickled = getattr(body, name), pickle.loads(pickle.dumps(getattr(body, name)))
+            assert np.array_equal(field.closest(points).position, pickled.closest(points).position)
+        assert copy.copy(body).margin == copy.deepcopy(body).margin == body.margin
+
+
 def test_mass(sphere, box, sphere_set):
     mass = bilayer.mass_properties(bilayer.box((1, 2, 3)))
     assert mass.volume == pytest.approx(6) and not mass.centre.any()
@@ -132,6 +154,35 @@ def test_distance(collider):
     assert inner.overlap == "a inside b" and inner.distance < 0
     with pytest.raises(ValueError, match="max_distance"):
         bilayer.distance(collider, None, collider, None, max_distance=-1)
+
+
+def test_time_of_impact(collider):
+    there = bilayer.Pose((5, 0.5, 0))
+    impact = bilayer.time_of_impact(collider, there, [[-8, 0, 0], [0, 0, 0]], collider, None, None)
+    assert impact.found and impact.fraction == pytest.approx(3 / 8, abs=1e-3)
+    assert impact.pose_a.position == pytest.approx([2, 0.5, 0], abs=0.01) and impact.pose_b == bilayer.Pose()
+    assert 0 <= impact.distance.distance < 0.01 and impact.distance.normal == pytest.approx([1, 0, 0], abs=1e-4)
+    both = bilayer.time_of_impact(
+        collider, there.matrix, [[-4, 0, 0], [0, 0, 0]], collider, None, [[4, 0, 0], [0, 0, 0]], tolerance=1e-4
+    )
+    assert both.fraction == pytest.approx(3 / 8, abs=1e-4)
+    small = bilayer.time_of_impact(collider, there, [[-8, 0, 0], [0, 0, 0]], collider, None, None, scale_a=0.5)
+    assert small.fraction == pytest.approx(3.5 / 8, abs=1e-3)
+    turning = bilayer.time_of_impact(collider, bilayer.Pose((2.2, 0, 0)), [[0, 0, 0], [0, 0, 1]], collider, None, None)
+    assert turning.found and 0 < turning.fraction < 0.5
+    assert not bilayer.time_of_impact(collider, there, [[1, 0, 0], [0, 0, 0]], collider, None, None).found
+    inside = bilayer.time_of_impact(collider, None, [[1, 0, 0], [0, 0, 0]], collider, None, None)
+    assert inside.found and inside.fraction == 0 and inside.distance.overlap != "none"
+    for arguments, options, message in (
+        ((collider, there, [1, 0, 0], collider, None, None), {}, "motion_a: expected"),
+        ((collider, there, None, collider, None, [[np.nan, 0, 0], [0, 0, 0]]), {}, r"motion_b\[0, 0\] is nan"),
+        ((collider, np.eye(3), None, collider, None, None), {}, "pose_a: expected"),
+        ((collider, there, None, collider, None, [[0, 0, 0], [0, 0, 2000]]), {}, "rad"),
+        ((collider, there, None, collider, None, None), {"tolerance": -1}, "tolerance is -1"),
+        ((collider, there, None, collider, None, None), {"scale_b": 0}, "scale_b"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            bilayer.time_of_impact(*arguments, **options)
 
 
 def test_distances(collider, random):

@@ -2,6 +2,7 @@
 """Field: queries against analytic answers, shapes, bad arguments."""
 
 import copy
+import pickle
 
 import numpy as np
 import pytest
@@ -167,6 +168,33 @@ def test_overlaps(box_field):
         box_field.overlaps_box([0, 0, 0], [-1, 1, 1])
     with pytest.raises(ValueError, match="radii"):
         box_field.overlaps_sphere([0, 0, 0], -1)
+
+
+@pytest.mark.parametrize("storage", ["float32", "fixed16"])
+def test_pickles(box, box_set, random, storage):
+    points = random.uniform(-2, 2, size=(3000, 3)).astype(np.float32)
+    for mesh in (None, (box.vertices, box.faces)):
+        field = bilayer.Field(box_set, mesh, storage)
+        again = pickle.loads(pickle.dumps(field))
+        assert (again.mesh is None) == (mesh is None) and again.memory_bytes == field.memory_bytes
+        for query, some in (("closest", points[:300]), ("sample", points)):
+            answers = zip(getattr(again, query)(some), getattr(field, query)(some))
+            assert all(np.array_equal(one, other) for one, other in answers)
+
+
+def test_long_batches_equal_single_queries(sphere_field, random):
+    points = random.uniform(-1.2, 1.2, size=(40_001, 3)).astype(np.float32)
+    few = slice(39_900, None)
+    for query in (sphere_field.sample, sphere_field.closest):
+        many, last = query(points), query(points[few])
+        assert np.array_equal(many.distance[few], last.distance)
+    assert np.array_equal(sphere_field.inside(points)[few], sphere_field.inside(points[few]))
+    rays = sphere_field.raycast(points, -points)
+    assert np.array_equal(rays.triangle[few], sphere_field.raycast(points[few], -points[few]).triangle)
+    directions = points.copy()
+    directions[30_000] = 0
+    with pytest.raises(ValueError, match="directions: direction 30000 is zero"):
+        sphere_field.raycast(points, directions)
 
 
 def test_attributes(box, box_set, box_field, sphere):

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """seed(), particles(), obstacle()."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -84,6 +87,10 @@ def test_obstacle(tmp_path):
     near = np.abs(truth) < 0.1
     assert np.abs(obstacle.distance - truth)[near].max() < 0.005
     assert np.allclose(obstacle.velocity[near][:, 2], 3)
+    for again in (pickle.loads(pickle.dumps(obstacle)), copy.copy(obstacle), copy.deepcopy(obstacle)):
+        assert np.array_equal(again.distance, obstacle.distance) and np.array_equal(again.origin, obstacle.origin)
+        assert np.array_equal(again.open_faces, obstacle.open_faces)
+        assert np.array_equal(again.velocity, obstacle.velocity)
     obstacle.save(tmp_path / "solid.vdb")
     assert bilayer.LevelSet.load(tmp_path / "solid.vdb").voxel_size == pytest.approx(0.05)
     for arguments, message in (

@@ -36,6 +36,88 @@ def test_dense(box_set):
         box_set.to_numpy(padding=100000)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"half_width_voxels": 12},
+        {"exterior_width_voxels": 2, "interior_width_voxels": 5},
+        {"exterior_width_voxels": 5, "interior_width_voxels": 2},
+        {"method": "double-layer"},
+        {"sign": "flood"},
+    ],
+)
+def test_dense_there_and_back(sphere, options):
+    level_set = bilayer.build(sphere, resolution=40, **options)
+    dense = level_set.to_numpy()
+    again = bilayer.LevelSet.from_numpy(*dense)
+    assert again == level_set and again.method == "" and np.isnan(again.error_bound)
+    assert np.array_equal(again.to_numpy().values, dense.values)
+    assert bilayer.LevelSet.from_numpy(dense.values.astype(float).tolist(), dense.origin, dense.spacing) == level_set
+    far = bilayer.Mesh(sphere.vertices, sphere.faces, origin=(1e6, 2, -3))
+    moved = bilayer.build(far, resolution=40, **options)
+    assert bilayer.LevelSet.from_numpy(*moved.to_numpy(), field_origin=moved.origin) == moved
+
+
+def test_thin_solids_and_dirty_meshes_there_and_back(sphere):
+    plate = bilayer.build(bilayer.box((2, 2, 0.1)), voxel_size=0.06, half_width_voxels=4)
+    film = bilayer.build(bilayer.box((2, 2, 0.02)).transformed(bilayer.Pose((0, 0, 0.001)).matrix), voxel_size=0.06)
+    cut = bilayer.Mesh(sphere.vertices, sphere.faces[: -len(sphere.faces) // 20])
+    for level_set in (plate, film, bilayer.build(cut, resolution=40)):
+        widths = (level_set.exterior_width, level_set.interior_width)
+        assert bilayer.LevelSet.from_numpy(*level_set.to_numpy(), half_width=widths) == level_set
+
+
+def unclamped(count=40, radius=0.6):
+    axis = np.linspace(-1, 1, count)
+    points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    return np.linalg.norm(points, axis=-1) - radius, axis[1] - axis[0]
+
+
+def test_from_numpy():
+    values, spacing = unclamped()
+    level_set = bilayer.LevelSet.from_numpy(values, (-1, -1, -1), spacing, field_origin=(-1, -1, -1))
+    assert level_set.origin.tolist() == [-1, -1, -1] and level_set.voxel_size == pytest.approx(spacing)
+    assert level_set.exterior_width == pytest.approx(0.4, abs=1e-3)  # at the middle of each side
+    field = bilayer.Field(level_set)
+    assert field.sample([1, 1, 1 + 0.65]).distance == pytest.approx(0.05, abs=0.003)
+    assert bilayer.mass_properties(level_set).volume == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.01)
+    narrow = bilayer.LevelSet.from_numpy(values, spacing=spacing, half_width=3 * spacing)
+    assert narrow.exterior_width == narrow.interior_width == pytest.approx(3 * spacing)
+    assert narrow.active_voxels < level_set.active_voxels
+    uneven = bilayer.LevelSet.from_numpy(values, spacing=spacing, half_width=(0.2, 0.1))
+    assert (uneven.exterior_width, uneven.interior_width) == pytest.approx((0.2, 0.1))
+
+
+@pytest.mark.parametrize(
+    "change, options, message",
+    [
+        (lambda v: v[0], {}, r"values: expected real numbers of shape \(nx, ny, nz\), got shape \(40, 40\)"),
+        (lambda v: v[:0], {}, "values: expected real numbers"),
+        (lambda v: v > 0, {}, "values: expected real numbers, got .* dtype bool"),
+        (lambda v: np.where(v < -0.5, np.nan, v), {}, r"values\[\d+, \d+, \d+\] is nan, and must be finite"),
+        (lambda v: v + 1, {}, "values: expected negative distances inside"),
+        (lambda v: v - 0.5, {}, "values: a voxel at the border of the array is at -"),
+        (lambda v: 10 * v, {}, r"values: values\[0, 0, 0\] is .* differ by at most"),
+        (lambda v: v / 10, {}, "values: across the surface they change by 0[.]"),
+        (lambda v: np.sign(v), {"spacing": 1}, "values: across the surface they change by 2 spacings"),
+        (np.sign, {}, "values: across the surface they change by"),
+        (lambda v: v, {"spacing": 0}, "spacing is 0"),
+        (lambda v: v, {"spacing": float("nan")}, "spacing is nan"),
+        (lambda v: v, {"origin": (0, 0)}, "origin: expected"),
+        (lambda v: v, {"origin": (0.01, 0, 0)}, r"origin\[0\] is 0.01, .* pass field_origin=origin"),
+        (lambda v: v, {"origin": (1e30, 0, 0)}, r"origin\[0\] is"),
+        (lambda v: v, {"half_width": 0}, "half_width is 0"),
+        (lambda v: v, {"half_width": (1, 2, 3)}, "half_width: expected a number"),
+        (lambda v: v, {"half_width": 2}, "half_width is 2 outside, but a voxel at the border"),
+    ],
+)
+def test_bad_arrays(change, options, message):
+    values, spacing = unclamped()
+    with pytest.raises(ValueError, match=message):
+        bilayer.LevelSet.from_numpy(change(values), **{"spacing": spacing, **options})
+
+
 def test_sparse(box):
     level_set = bilayer.build(box, resolution=32, triangles=True)
     sparse = level_set.sparse()

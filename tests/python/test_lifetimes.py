@@ -51,14 +51,23 @@ def test_one_cache_from_many_threads(collider):
         assert all(pool.map(work, range(64)))
 
 
-@pytest.mark.parametrize("name", ["build", "inspect", "closest"])
+@pytest.mark.parametrize(
+    "name", ["build", "inspect", "closest", "Mesh", "Field", "Collider", "from_numpy", "particles"]
+)
 def test_other_threads_run_during_calls(name, sphere, sphere_field):
     mesh = bilayer.sphere(1, subdivisions=7)
+    level_set = bilayer.build(mesh, resolution=200)
+    dense = level_set.to_numpy()
     points = np.random.default_rng(1).uniform(-3, 3, size=(2_000_000, 3)).astype(np.float32)
     calls = {
         "build": lambda: bilayer.build(mesh, resolution=300),
         "inspect": lambda: bilayer.inspect(mesh),
         "closest": lambda: sphere_field.closest(points),
+        "Mesh": lambda: [bilayer.Mesh(mesh.vertices, mesh.faces) for _ in range(30)],
+        "Field": lambda: bilayer.Field(level_set, mesh),
+        "Collider": lambda: bilayer.Collider(mesh, level_set),
+        "from_numpy": lambda: bilayer.LevelSet.from_numpy(*dense),
+        "particles": lambda: bilayer.particles(level_set, per_voxel=20),
     }
     worker = threading.Thread(target=calls[name])
     begin = time.monotonic()
@@ -116,7 +125,9 @@ def test_memory_does_not_grow(box):
         body = bilayer.Collider(box, level_set)
         bilayer.collide(body, bilayer.Pose((0, 0, 1.99)), body, None, margin=0.1, cache=bilayer.ContactCache())
         bilayer.distance(body, bilayer.Pose((3, 0, 0)), body, None)
-        pickle.loads(pickle.dumps(level_set))
+        pickle.loads(pickle.dumps((level_set, field, body)))
+        bilayer.LevelSet.from_numpy(*level_set.to_numpy())
+        bilayer.time_of_impact(body, bilayer.Pose((3, 0, 0)), [[-2, 0, 0], [0, 0, 0]], body, None, None)
         with pytest.raises(ValueError):
             field.sample([1])
 

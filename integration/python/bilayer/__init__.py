@@ -31,6 +31,7 @@ from bilayer._bilayer import (
     read_mesh,
     rebuild,
     seed,
+    time_of_impact,
     with_body,
 )
 from bilayer.meshes import as_mesh, box, sphere
@@ -40,6 +41,7 @@ from bilayer.results import (
     Contacts,
     Dense,
     Hits,
+    Impact,
     MassProperties,
     MeshReport,
     Samples,
@@ -58,6 +60,7 @@ __all__ = [
     "DeviceError",
     "Field",
     "Hits",
+    "Impact",
     "LevelSet",
     "MassProperties",
     "Mesh",
@@ -83,5 +86,6 @@ __all__ = [
     "rebuild",
     "seed",
     "sphere",
+    "time_of_impact",
     "with_body",
 ]

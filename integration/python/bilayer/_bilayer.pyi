@@ -10,6 +10,7 @@ from bilayer.results import (
     Contacts,
     Dense,
     Hits,
+    Impact,
     MassProperties,
     MeshReport,
     Samples,
@@ -82,6 +83,15 @@ class LevelSet:
     def surface(self, isovalue: float = 0, adaptivity: float = 0) -> Mesh: ...
     def extended(self, distance: Optional[float] = None) -> LevelSet: ...
     def save(self, path: _Path, half_float: bool = False) -> None: ...
+    @staticmethod
+    def from_numpy(
+        values: ArrayLike,
+        origin: ArrayLike = ...,
+        spacing: float = 1,
+        *,
+        half_width: Optional[ArrayLike] = None,
+        field_origin: ArrayLike = ...,
+    ) -> LevelSet: ...
     @staticmethod
     def load(path: _Path) -> LevelSet: ...
     def __eq__(self, other: object) -> bool: ...
@@ -176,6 +186,8 @@ class Obstacle:
     @property
     def voxel_size(self) -> float: ...
     def save(self, path: _Path) -> None: ...
+    def __copy__(self) -> Obstacle: ...
+    def __deepcopy__(self, memo: Dict[int, Any]) -> Obstacle: ...
 
 def read_mesh(path: _Path) -> Mesh: ...
 def inspect(mesh: _MeshLike, wall: float = 0) -> MeshReport: ...
@@ -265,6 +277,18 @@ def distances(
     pairs: ArrayLike,
     max_distance: float = ...,
 ) -> _Floats: ...
+def time_of_impact(
+    a: Collider,
+    pose_a: _PoseLike,
+    motion_a: Optional[ArrayLike],
+    b: Collider,
+    pose_b: _PoseLike,
+    motion_b: Optional[ArrayLike],
+    *,
+    scale_a: float = 1,
+    scale_b: float = 1,
+    tolerance: float = 0,
+) -> Impact: ...
 def seed(
     liquid: LevelSet,
     body: Any,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from bilayer._bilayer import LevelSet
+    from bilayer._bilayer import LevelSet, Pose
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
@@ -72,6 +72,16 @@ class BodyDistance(NamedTuple):
     normal: Floats
     triangle_a: int
     triangle_b: int
+
+
+class Impact(NamedTuple):
+    """time_of_impact(): of two moving bodies, their poses and distance when they touch."""
+
+    found: bool
+    fraction: float
+    pose_a: Pose
+    pose_b: Pose
+    distance: BodyDistance
 
 
 class MassProperties(NamedTuple):

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Long calls that Ctrl-C cancels.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <utility>
+
+namespace bilayer::python {
+
+namespace py = pybind11;
+
+/// As BuildOptions::progress.
+using Listener = std::function<bool(float)>;
+
+/// Runs a job on a thread of its own and without the GIL. The calling thread, to which signals belong, looks for Ctrl-C
+/// and calls `progress` with the completed fraction. Call this with the GIL held.
+/// @param progress  a callable, which cancels by returning False, or None
+/// Throws what the job throws, what `progress` or a signal handler raises, and Cancelled; always after the job's end.
+void runCancellable(const py::object& progress, const std::function<void(const Listener&)>& job);
+
+/// The same for a job with a result.
+template <class Job>
+auto cancellable(const py::object& progress, Job job) {
+    std::optional<decltype(job(Listener()))> result;
+    runCancellable(progress, [&](const Listener& listener) { result.emplace(job(listener)); });
+    return std::move(*result);
+}
+
+/// Answers a batch in parts on all cores, without the GIL, and looks for Ctrl-C every few of them. Call this with the
+/// GIL held.
+/// @param part    count of the items of a part; the last part may be smaller
+/// @param answer  answers the items of [begin, end); called from any thread, concurrently
+/// Throws what `answer` throws, and what a signal handler raises.
+void answerInParts(std::size_t count, std::size_t part,
+                   const std::function<void(std::size_t begin, std::size_t end)>& answer);
+
+}  // namespace bilayer::python

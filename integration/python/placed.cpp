@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integration/python/placed.h"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "integration/python/arguments.h"
+#include "integration/python/arrays.h"
+
+namespace bilayer::python {
+namespace {
+
+Motion motionOf(const py::object& object, const char* name) {
+    if (object.is_none()) return {};
+    const Floats motion(object, name, {2, 3});
+    if (!motion.shape().empty())
+        throw std::invalid_argument(
+            fmt::format("{}: expected a displacement and a rotation vector, shape (2, 3), got {} of them", name,
+                        text(motion.shape())));
+    return {motion.points()[0], motion.points()[1]};
+}
+
+}  // namespace
+
+Placed placed(const ColliderObject& collider, const py::object& pose, float scale, const py::object& motion,
+              const char* name) {
+    const std::string suffix = std::string("_") + name;
+    requirePositive(double(scale), ("scale" + suffix).c_str());
+    return {collider, poseOf(pose, ("pose" + suffix).c_str()), scale, motionOf(motion, ("motion" + suffix).c_str())};
+}
+
+}  // namespace bilayer::python
