@@ -40,7 +40,7 @@ struct Placed {
     const Collider& collider;  ///< the body's shape; must outlive the call
     Pose pose{};               ///< of the body's mesh in the world
     float scale = 1;           ///< positive; also scales distances
-    Motion motion{};           ///< over the step, without the scale
+    Motion motion{};           ///< over the step, in world coordinates
 };
 
 /// A contact point between two bodies: touching, close to each other, or predicted to touch.
