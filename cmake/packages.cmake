@@ -1,43 +1,39 @@
 # SPDX-License-Identifier: Apache-2.0
 # Files for pkg-config, and Debian packages by CPack. docs/packages.md describes both.
 
-# bilayer_pkgconfig(NAME DESCRIPTION MODULES...): bilayer-NAME.pc. MODULES are those of pkg-config that the library stands on; LIBS
-# are the linker's flags for what has no module. A static library needs all of them to be linked, a shared one by itself.
+# bilayer_pkgconfig(NAME DESCRIPTION PUBLIC... PRIVATE... LIBS...): bilayer-NAME.pc. PUBLIC and PRIVATE are the modules of pkg-config
+# that the headers and the library stand on; LIBS are flags of the linker for what has no module. A static library is linked with
+# all of them.
 function(bilayer_pkgconfig name description)
   if(NOT TARGET bilayer_${name})
     return()
   endif()
-  cmake_parse_arguments(ARG "" "LIBS;CFLAGS" "PUBLIC;PRIVATE" ${ARGN})
-  set(private "")
-  if(BUILD_SHARED_LIBS)
-    set(private .private)
-  endif()
-  list(JOIN ARG_PUBLIC " " public)
-  list(JOIN ARG_PRIVATE " " modules)
+  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;LIBS" ${ARGN})
+  set(modules ${ARG_PUBLIC})
   if(NOT BUILD_SHARED_LIBS)
-    string(STRIP "${public} ${modules}" public)
-    set(modules "")
+    list(APPEND modules ${ARG_PRIVATE})
   endif()
-  file(RELATIVE_PATH up /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
-  string(REGEX REPLACE "/$" "" up "${up}")
+  list(JOIN modules " " modules)
+  list(JOIN ARG_LIBS " " libs)
+  set(folder ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+  file(RELATIVE_PATH prefix /${folder} /)  # so that the installed files may be moved
+  set(file ${PROJECT_BINARY_DIR}/pkgconfig/bilayer-${name}.pc)
   string(CONCAT text
-    "prefix=\${pcfiledir}/${up}\nlibdir=\${prefix}/${CMAKE_INSTALL_LIBDIR}\nincludedir=\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}\n\n"
-    "Name: bilayer-${name}\nDescription: ${description}\nVersion: ${PROJECT_VERSION}\n"
-    "Requires: ${public}\nRequires.private: ${modules}\nCflags: -I\${includedir} ${ARG_CFLAGS}\n"
-    "Libs: -L\${libdir} -lbilayer_${name}\nLibs${private}: ${ARG_LIBS}\n")
-  if(NOT BUILD_SHARED_LIBS)  # one field of each name
-    string(REPLACE "-lbilayer_${name}\nLibs: ${ARG_LIBS}" "-lbilayer_${name} ${ARG_LIBS}" text "${text}")
-  endif()
-  string(REGEX REPLACE "\n(Requires|Requires.private): *(\n|$)" "\n" text "${text}")
-  string(REGEX REPLACE "\n(Requires|Requires.private): *\n" "\n" text "${text}")
-  string(REGEX REPLACE " +\n" "\n" text "${text}")
-  file(WRITE ${PROJECT_BINARY_DIR}/pkgconfig/bilayer-${name}.pc "${text}")
-  install(FILES ${PROJECT_BINARY_DIR}/pkgconfig/bilayer-${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
-    COMPONENT ${name})
+    "prefix=\${pcfiledir}/${prefix}\n"
+    "libdir=\${prefix}/${CMAKE_INSTALL_LIBDIR}\n"
+    "includedir=\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}\n\n"
+    "Name: bilayer-${name}\n"
+    "Description: ${description}\n"
+    "Version: ${PROJECT_VERSION}\n"
+    "Requires: ${modules}\n"
+    "Cflags: -I\${includedir}\n"
+    "Libs: -L\${libdir} -lbilayer_${name} ${libs}\n")
+  file(WRITE ${file} "${text}")
+  install(FILES ${file} DESTINATION ${folder} COMPONENT ${name})
 endfunction()
 
 bilayer_pkgconfig(sdf "Signed distance fields from triangle meshes" PUBLIC glm PRIVATE tbb assimp libhwy zlib fmt Imath
-  LIBS "-lopenvdb -pthread")
+  LIBS -lopenvdb -pthread)
 bilayer_pkgconfig(collider "Queries and contacts on signed distance fields" PUBLIC bilayer-sdf PRIVATE tbb)
 bilayer_pkgconfig(cl "Signed distance fields on OpenCL devices" PUBLIC bilayer-collider PRIVATE OpenCL tbb)
 bilayer_pkgconfig(bullet "Bodies with signed distance fields in Bullet" PUBLIC bilayer-collider bullet PRIVATE tbb)
@@ -59,18 +55,18 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/cmake/debian_layout.cmake)
 
 set(CPACK_DEBIAN_PROGRAM_DESCRIPTION
-  "signed distance fields from triangle meshes: the command line\n Builds narrow-band signed distance fields in OpenVDB files, reports defects of meshes, and seeds liquids.")
+  "The command line. It builds narrow-band signed distance fields in OpenVDB files, reports defects of meshes, and seeds liquids.")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME bilayer)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
-  "signed distance fields from triangle meshes: headers and libraries\n Static libraries with headers for fields, queries, contacts in Bullet, liquids, and OpenCL devices.")
+  "Headers and static libraries for fields, queries, contacts in Bullet, liquids, and OpenCL devices.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libbilayer-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 # what cmake/dependencies.cmake looks for
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   "libopenvdb-dev, libboost-iostreams-dev, libblosc-dev, libtbb-dev, libassimp-dev, libhwy-dev, libglm-dev, libfmt-dev, zlib1g-dev, libbullet-dev, ocl-icd-opencl-dev, opencl-clhpp-headers")
 set(CPACK_DEBIAN_PYTHON_DESCRIPTION
-  "signed distance fields from triangle meshes: the Python module\n Fields, queries, contacts and liquids on numpy arrays.")
+  "The Python module: fields, queries, contacts and liquids on numpy arrays.")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-bilayer)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
