@@ -38,7 +38,7 @@ struct Placed {
     const Collider& collider;  ///< the body's shape; must outlive the call
     Pose pose{};               ///< of the body's mesh in the world
     float scale = 1;           ///< positive; also scales distances
-    Motion motion{};           ///< over the step, without the scale
+    Motion motion{};           ///< over the step, in world coordinates
 };
 
 /// A shape placed in the world, with an optional uniform scale. Body coordinates x map to pose.toWorld(scale * x).

@@ -28,9 +28,9 @@ struct Bounds {
 
     /// Lengths of the sides [m].
     glm::vec3 size() const { return upper - lower; }
-    /// [m]
+    /// The middle of the box [m].
     glm::vec3 centre() const { return 0.5f * (lower + upper); }
-    float longestSide() const;  ///< [m]
+    float longestSide() const;  ///< its length [m]
     /// Whether it holds no point.
     bool empty() const { return lower.x > upper.x; }
     /// Grows to hold a point.

@@ -10,5 +10,5 @@ mkdir -p "$out/source" "$out/doxygen"
 doxygen docs/site/Doxyfile
 # the pages and what they link, where Sphinx finds nothing else: it follows links into all folders
 ln -s "$PWD"/{README.md,CHANGELOG.md,CONTRIBUTING.md,SECURITY.md,RELEASE.md,LICENSE,docs} "$out/source/"
-sphinx-build -q -W --keep-going -b html -d "$out/doctrees" -c docs/site "$out/source" "$out/html"
+/usr/bin/sphinx-build -q -W --keep-going -b html -d "$out/doctrees" -c docs/site "$out/source" "$out/html"
 python3 docs/site/check_links.py "$out/html"

@@ -24,12 +24,10 @@ source_suffix = {".md": "markdown"}
 include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "RELEASE.md", "docs/**.md"]
 exclude_patterns = ["docs/site/**"]
 myst_heading_anchors = 4
-myst_enable_extensions = []
 highlight_language = "none"
 
 html_theme = "furo"
 html_title = f"bilayer {release}"
-html_static_path = []
 html_copy_source = False
 html_show_sphinx = False
 html_show_copyright = False

@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# usage: debian.sh DIR: installs the packages in DIR into a clean Debian 12 root, and uses them there as users do: the command
+# line, a program by CMake and one by pkg-config, the Python module. Exits with 4, which skips it, where no root can be made.
+set -euo pipefail
+source=$(cd "$(dirname "$0")/../.." && pwd)
+packages=$(cd "${1:?"the folder of the packages"}" && pwd)
+
+skip() { echo "skipped: $*"; exit 4; }
+((EUID == 0)) || skip "only root can make a root folder"
+command -v mmdebstrap >/dev/null || skip "mmdebstrap is not installed"
+compgen -G "$packages/*.deb" >/dev/null || { echo "debian.sh: no packages in $packages"; exit 1; }
+
+root=$(mktemp -d)
+trap 'rm -rf "$root"' EXIT
+chmod 755 "$root"
+# the sources and proxies of this machine, Debian's alone
+options=()
+for file in /etc/apt/apt.conf.d/*proxy* /etc/apt/apt.conf.d/*registry*; do
+  [[ ! -f $file ]] || options+=(--aptopt="$file")
+done
+mmdebstrap --variant=minbase --quiet "${options[@]}" bookworm "$root" || skip "mmdebstrap finds no Debian mirror"
+
+mkdir "$root/packages" "$root/user"
+cp "$packages"/*.deb "$root/packages/"
+cp -r "$source/tests/package/consumer" "$root/user/"
+cp "$source/tests/package/parent/main.cpp" "$root/user/cube.cpp"
+cp -L /etc/resolv.conf /etc/hosts "$root/etc/"
+chroot "$root" bash -euo pipefail <<'IN_ROOT'
+export DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8
+cd /user
+apt-get update -qq
+install() { apt-get install -y -qq --no-install-recommends "$@" >/tmp/apt.log 2>&1 || { cat /tmp/apt.log; exit 1; }; }
+
+echo "== the command line, with what it depends on alone"
+install /packages/bilayer_*.deb
+bilayer --version
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n' >tetrahedron.obj
+bilayer build tetrahedron.obj -o tetrahedron.vdb --resolution 32 --body
+bilayer info tetrahedron.vdb
+bilayer devices
+
+echo "== the Python module"
+install /packages/python3-bilayer_*.deb
+python3 -c 'import bilayer; print(bilayer.__version__, bilayer.Field(bilayer.build(bilayer.box(), resolution=8)).sample([0, 0, 0]).distance)'
+
+echo "== a program by CMake, and one by pkg-config"
+install /packages/libbilayer-dev_*.deb g++ cmake make pkg-config
+cmake -S consumer -B build >/dev/null
+cmake --build build >/dev/null
+build/consumer
+g++ -std=c++20 cube.cpp $(pkg-config --cflags --libs bilayer-sdf) -o cube
+./cube
+
+echo "== removed without a trace"
+apt-get purge -y -qq bilayer libbilayer-dev python3-bilayer >/dev/null 2>&1
+[[ -z $(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*') ]]
+IN_ROOT
+echo "the packages work in a clean Debian 12"
