@@ -34,7 +34,7 @@ endfunction()
 
 bilayer_pkgconfig(sdf "Signed distance fields from triangle meshes" PUBLIC glm PRIVATE tbb assimp libhwy zlib fmt Imath
   LIBS -lopenvdb -pthread)
-bilayer_pkgconfig(collider "Queries and contacts on signed distance fields" PUBLIC bilayer-sdf PRIVATE tbb)
+bilayer_pkgconfig(collider "Queries and contacts on signed distance fields" PUBLIC bilayer-sdf PRIVATE tbb qhull_r)
 bilayer_pkgconfig(cl "Signed distance fields on OpenCL devices" PUBLIC bilayer-collider PRIVATE OpenCL tbb)
 bilayer_pkgconfig(bullet "Bodies with signed distance fields in Bullet" PUBLIC bilayer-collider bullet PRIVATE tbb)
 bilayer_pkgconfig(fluid "Liquids and obstacles on OpenVDB grids" PUBLIC bilayer-collider Imath tbb PRIVATE fmt LIBS -lopenvdb)
@@ -64,7 +64,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libbilayer-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 # what cmake/dependencies.cmake looks for
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libopenvdb-dev, libboost-iostreams-dev, libblosc-dev, libtbb-dev, libassimp-dev, libhwy-dev, libglm-dev, libfmt-dev, zlib1g-dev, libbullet-dev, ocl-icd-opencl-dev, opencl-clhpp-headers")
+  "libopenvdb-dev, libboost-iostreams-dev, libblosc-dev, libtbb-dev, libassimp-dev, libhwy-dev, libqhull-dev, libglm-dev, libfmt-dev, zlib1g-dev, libbullet-dev, ocl-icd-opencl-dev, opencl-clhpp-headers")
 set(CPACK_DEBIAN_PYTHON_DESCRIPTION
   "The Python module: fields, queries, contacts and liquids on numpy arrays.")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-bilayer)

@@ -33,7 +33,7 @@ class Bilayer(ConanFile):
         self.requires("glm/[>=0.9.9]", transitive_headers=True)
         for package in ("openvdb/[>=10 <11]", "onetbb/[>=2021.8]"):
             self.requires(package, transitive_headers=bool(self.options.fluid))
-        for package in ("assimp/[>=5.2 <6]", "highway/[>=1.0.3]", "zlib/[>=1.2.11]", "fmt/[>=9]"):
+        for package in ("assimp/[>=5.2 <6]", "highway/[>=1.0.3]", "qhull/[>=8.0]", "zlib/[>=1.2.11]", "fmt/[>=9]"):
             self.requires(package)
         if self.options.bullet:
             self.requires("bullet3/[>=3.24]", transitive_headers=True)
