@@ -43,10 +43,10 @@ struct Placed {
 
 /// A shape placed in the world, with an optional uniform scale. Body coordinates x map to pose.toWorld(scale * x).
 struct PlacedShape {
-    ContactShape shape;
-    Pose pose{};
-    float scale = 1;  ///< positive; also scales distances
-    Motion motion{};
+    ContactShape shape;  ///< shares its data
+    Pose pose{};         ///< in the world
+    float scale = 1;     ///< positive; also scales distances
+    Motion motion{};     ///< over the step
 };
 
 /// A contact point between two bodies: touching, close to each other, or predicted to touch.
@@ -152,12 +152,15 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
 class PointSampler {
   public:
     PointSampler() = default;  ///< no sampler
+    /// For internal use; openclPointSampler() makes a sampler.
     explicit PointSampler(detail::DeviceSampler sampler);
 
+    /// Whether there is a sampler.
     explicit operator bool() const { return data_ != nullptr; }
     const std::string& backend() const;  ///< "opencl"; requires a sampler
     const std::string& device() const;   ///< the device's name; requires a sampler
 
+    /// The data; for internal use.
     const detail::DeviceSampler& data() const { return *data_; }
 
   private:

@@ -48,12 +48,16 @@ class ContactShape {
     /// A concave body.
     explicit ContactShape(Collider collider);
 
+    /// A sphere around the origin.
     static ContactShape sphere(float radius);
+    /// A box around the origin.
     static ContactShape box(const glm::vec3& halfExtents);
+    /// A cylinder with two half spheres.
     /// @param halfHeight  from the middle to the centre of either end's sphere; 0: a sphere
     static ContactShape capsule(float radius, float halfHeight);
+    /// A cylinder around the origin.
     static ContactShape cylinder(float radius, float halfHeight);
-    /// The base lies at -halfHeight, the apex at +halfHeight.
+    /// A cone. The base lies at -halfHeight, the apex at +halfHeight.
     static ContactShape cone(float radius, float halfHeight);
     /// The convex hull of points, grown by a radius. Throws std::invalid_argument if the points lie in one plane.
     static ContactShape hull(std::span<const glm::vec3> points, float radius = 0);

@@ -25,11 +25,13 @@ struct DeviceFiller;
 /// Cheap to copy.
 class BlockFiller {
   public:
+    /// For internal use; openclFiller() makes a filler.
     explicit BlockFiller(detail::DeviceFiller filler);
 
     const std::string& backend() const;  ///< "opencl"
     const std::string& device() const;   ///< the device's name
 
+    /// The data; for internal use.
     const detail::DeviceFiller& data() const { return *data_; }
 
   private:
