@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include <bilayer/integration/bullet/extensions.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
@@ -186,4 +187,88 @@ TEST_CASE("Bodies with a round base keep their speed without friction") {
             CHECK(body->getLinearVelocity().x() == Approx(2).epsilon(0.03));  // for a ball, 2 % for a box
             CHECK(body->getWorldTransform().getOrigin().z() == Approx(kind.height).margin(0.002));
         }
+}
+
+namespace {
+
+/// Waves of 0.1 m, 8 m long and 4 m wide, of squares of two triangles each.
+Mesh waves(float cell) {
+    const int columns = int(8 / cell), rows = int(4 / cell);
+    Mesh mesh;
+    for (int j = 0; j <= rows; ++j)
+        for (int i = 0; i <= columns; ++i) {
+            const float x = cell * float(i) - 4, y = cell * float(j) - 2;
+            mesh.points.push_back({x, y, 0.1f * std::sin(2.1f * x + 1) * std::cos(1.3f * y)});
+        }
+    const auto row = unsigned(columns + 1);
+    for (unsigned j = 0; j < unsigned(rows); ++j)
+        for (unsigned i = 0; i + 1 < row; ++i) {
+            const unsigned a = j * row + i, b = a + 1, c = a + row;
+            mesh.triangles.push_back({a, b, c});
+            mesh.triangles.push_back({b, c + 1, c});
+        }
+    return mesh;
+}
+
+/// The energy of a body of 1 kg that slides over waves without friction, and its maximum loss in one step.
+struct Slide {
+    float start = 0, end = 0;  ///< after it has landed, and at the end [J]
+    float kinetic = 0;         ///< at the start [J]
+    float maxLoss = 0;         ///< [J]
+};
+
+Slide slide(btCollisionShape& ground, btCollisionShape& shape, float height, float y, float steps, float seconds) {
+    World world;
+    const bullet::WorldExtensions extensions(world.dynamics);
+    world.add(ground, 0, {0, 0, 0});
+    btRigidBody* body = world.add(shape, 1, {-3, y, height + 0.1f});
+    body->setFriction(0);
+    body->setDamping(0, 0);
+    body->setActivationState(DISABLE_DEACTIVATION);
+    body->setLinearVelocity({2, 0, 0});
+    body->setLinearFactor({1, 0, 1});
+    const auto kinetic = [&] {
+        const btVector3 spin = body->getAngularVelocity();
+        const btMatrix3x3 inertia = body->getInvInertiaTensorWorld().inverse();
+        return 0.5f * float(body->getLinearVelocity().length2() + spin.dot(inertia * spin));
+    };
+    const auto energy = [&] { return kinetic() + 9.81f * float(body->getCenterOfMassPosition().z()); };
+    Slide slide;
+    for (int i = 0; float(i) < seconds * steps; ++i) {
+        const float before = energy();
+        world.dynamics.stepSimulation(1 / steps, 0);
+        if (float(i) < 0.6f * steps)
+            slide.start = energy(), slide.kinetic = kinetic();
+        else
+            slide.maxLoss = std::max(slide.maxLoss, before - energy());
+    }
+    slide.end = energy();
+    return slide;
+}
+
+}  // namespace
+
+TEST_CASE("A body that slides over high waves is not stopped at an edge of the ground") {
+    const float cell = GENERATE(0.25f, 0.6f), steps = GENERATE(60.f, 240.f);
+    const unsigned seed = test::seed();
+    CAPTURE(cell, steps, seed);
+    Random random(seed);
+    TriangleShape ground(waves(cell));
+    Shape block(exactBox({0.3f, 0.3f, 0.15f}, 0.0125f)), ball(exactSphere(0.25f, 0.0125f));
+    for (int i = 0; i < 6; ++i) {
+        const float y = float(random(-1, 1));
+        CAPTURE(i, y);
+        // An edge of 15 degrees takes 7 % of the energy, 0.2 J.
+        CHECK(slide(*ground.shape, block, 0.15f, y, steps, 2.5f).maxLoss < 0.3f);
+        CHECK(slide(*ground.shape, ball, 0.25f, y, steps, 2.5f).maxLoss < 0.3f);
+    }
+}
+
+TEST_CASE("A body that slides over smooth high waves keeps its speed without friction") {
+    const float steps = GENERATE(60.f, 240.f);
+    CAPTURE(steps);
+    TriangleShape ground(waves(0.04f));
+    Shape block(exactBox({0.3f, 0.3f, 0.15f}, 0.0125f));
+    const Slide result = slide(*ground.shape, block, 0.15f, 0.13f, steps, 2);
+    CHECK(result.end == Approx(result.start).margin(0.04f * result.kinetic));  // 2 % of the speed
 }
