@@ -5,9 +5,12 @@
 #include <libqhull_r/qhull_ra.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <map>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -25,7 +28,8 @@ constexpr double coplanar = 1e-6;
 class QhullRun {
   public:
     /// @param coordinates  three for each point
-    QhullRun(std::vector<double>& coordinates, double size) : messages_(std::tmpfile()) {
+    QhullRun(std::vector<double>& coordinates, double size) : messages_(open_memstream(&text_, &textSize_)) {
+        if (!messages_) throw std::bad_alloc();
         std::string command = fmt::format("qhull C-{}", coplanar * size);
         qh_zero(&qh_, messages_);
         const int count = int(coordinates.size() / 3);
@@ -35,7 +39,8 @@ class QhullRun {
         qh_freeqhull(&qh_, !qh_ALL);
         int memory = 0, blocks = 0;
         qh_memfreeshort(&qh_, &memory, &blocks);
-        if (messages_) std::fclose(messages_);
+        std::fclose(messages_);
+        std::free(text_);
     }
     QhullRun(const QhullRun&) = delete;
     QhullRun& operator=(const QhullRun&) = delete;
@@ -44,7 +49,9 @@ class QhullRun {
     qhT* state() { return &qh_; }
 
   private:
-    std::FILE* messages_;
+    char* text_ = nullptr;
+    std::size_t textSize_ = 0;
+    std::FILE* messages_;  // writes to `text_`, which nobody reads
     qhT qh_;
     int status_;
 };
