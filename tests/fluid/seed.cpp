@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include <bilayer/integration/fluid/obstacle.h>
 #include <bilayer/integration/fluid/seed.h>
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
