@@ -10,7 +10,7 @@ GROUPS = {
     "Fields": ["build", "rebuild", "LevelSet", "Dense", "Sparse", "devices", "Cancelled", "DeviceError"],
     "Queries": ["Field", "Samples", "ClosestPoints", "Hits"],
     "Bodies": [
-        "Pose", "Collider", "with_body", "mass_properties", "MassProperties", "collide", "Contacts", "ContactCache",
+        "Pose", "Collider", "Shape", "with_body", "mass_properties", "MassProperties", "collide", "Contacts", "ContactCache",
         "distance", "distances", "BodyDistance", "time_of_impact", "Impact",
     ],
     "Liquids": ["seed", "Seeded", "particles", "obstacle", "Obstacle"],

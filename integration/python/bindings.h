@@ -11,6 +11,7 @@ void addLevelSet(pybind11::module_& module);
 void addBuild(pybind11::module_& module);
 void addField(pybind11::module_& module);
 void addPose(pybind11::module_& module);
+void addShape(pybind11::module_& module);
 void addCollider(pybind11::module_& module);
 void addContact(pybind11::module_& module);
 void addDistance(pybind11::module_& module);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// collide(): the contacts of two posed colliders.
+// collide(): the contacts of two posed bodies.
 #include <bilayer/collider/contact.h>
 
 #include <fmt/format.h>
@@ -23,18 +23,19 @@ struct LockedCache {
     std::mutex mutex;
 };
 
-py::object findContacts(const ColliderObject& a, const py::object& poseA, const ColliderObject& b,
-                        const py::object& poseB, float margin, bool exact, float scaleA, float scaleB,
-                        const py::object& motionA, const py::object& motionB, float minNormalCosine,
-                        float minNormalCosineApart, bool keepsObliqueEdges, LockedCache* cache) {
+py::object findContacts(const py::object& a, const py::object& poseA, const py::object& b, const py::object& poseB,
+                        float margin, bool exact, float scaleA, float scaleB, const py::object& motionA,
+                        const py::object& motionB, float minNormalCosine, float minNormalCosineApart,
+                        bool keepsObliqueEdges, bool reduced, LockedCache* cache) {
     if (!(margin >= 0) || !std::isfinite(margin))
         throw std::invalid_argument(fmt::format("margin is {}, and must be 0 or above", margin));
-    const Placed first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");
+    const PlacedShape first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");
     const ContactOptions options{.margin = margin,
                                  .exact = exact,
                                  .minNormalCosine = minNormalCosine,
                                  .minNormalCosineApart = minNormalCosineApart,
-                                 .keepsObliqueEdges = keepsObliqueEdges};
+                                 .keepsObliqueEdges = keepsObliqueEdges,
+                                 .reduced = reduced};
     std::vector<Contact> contacts;
     ContactReport report;
     {
@@ -53,17 +54,18 @@ py::object findContacts(const ColliderObject& a, const py::object& poseA, const 
 
 constexpr const char* collideDoc =
     R"(collide(a, pose_a, b, pose_b, *, margin=0, exact=False, scale_a=1, scale_b=1, motion_a=None, motion_b=None,
-        min_normal_cosine=0.3, min_normal_cosine_apart=0.9, keeps_oblique_edges=False, cache=None) -> Contacts
+        min_normal_cosine=0.3, min_normal_cosine_apart=0.9, keeps_oblique_edges=False, reduced=False, cache=None) -> Contacts
 
 The contacts of two bodies: where surface points of each are within `margin` of the other.
 
-a, b: Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
+a, b: Collider or Shape, one of them a Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
 margin: contacts are reported up to this separation, in the meshes' unit.
 exact: take distances from the triangles everywhere.
 scale_a, scale_b: uniform scales, above 0.
 motion_a, motion_b: displacement and rotation vector over the step, shape (2, 3), for speculative contacts.
 min_normal_cosine, min_normal_cosine_apart, keeps_oblique_edges: the filter of contacts at inner edges.
-cache: the ContactCache of this pair, which makes the next call faster and changes no contact.
+reduced: keep the few contacts of each patch that a solver needs, up to twelve.
+cache: the ContactCache of this pair, which makes the next call faster; reduced contacts then stay the same at rest.
 
 position: float32 (N, 3), on the surface of b. normal: float32 (N, 3), from b to a. distance: float32 (N,), negative
 where the bodies penetrate. feature: uint32 (N,), which point or edge; the top bit is set for those of b. approach and
@@ -98,7 +100,7 @@ void addContact(py::module_& module) {
                py::arg("margin") = 0.f, py::arg("exact") = false, py::arg("scale_a") = 1.f, py::arg("scale_b") = 1.f,
                py::arg("motion_a") = py::none(), py::arg("motion_b") = py::none(), py::arg("min_normal_cosine") = 0.3f,
                py::arg("min_normal_cosine_apart") = 0.9f, py::arg("keeps_oblique_edges") = false,
-               py::arg("cache") = py::none(), collideDoc);
+               py::arg("reduced") = false, py::arg("cache") = py::none(), collideDoc);
 }
 
 }  // namespace bilayer::python

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// distance(), distances() and time_of_impact() of posed colliders.
+// distance(), distances() and time_of_impact() of posed bodies.
 #include <bilayer/collider/distance.h>
 
 #include <fmt/format.h>
@@ -48,9 +48,10 @@ DistanceOptions reachOf(float maxDistance) {
     return {maxDistance};
 }
 
-py::object findDistance(const ColliderObject& a, const py::object& poseA, const ColliderObject& b,
-                        const py::object& poseB, float scaleA, float scaleB, float maxDistance) {
-    const Placed first = placed(a, poseA, scaleA, py::none(), "a"), second = placed(b, poseB, scaleB, py::none(), "b");
+py::object findDistance(const py::object& a, const py::object& poseA, const py::object& b, const py::object& poseB,
+                        float scaleA, float scaleB, float maxDistance) {
+    const PlacedShape first = placed(a, poseA, scaleA, py::none(), "a"),
+                      second = placed(b, poseB, scaleB, py::none(), "b");
     const DistanceOptions options = reachOf(maxDistance);
     BodyDistance answer;
     {
@@ -60,10 +61,9 @@ py::object findDistance(const ColliderObject& a, const py::object& poseA, const 
     return toResult(answer);
 }
 
-py::object findImpact(const ColliderObject& a, const py::object& poseA, const py::object& motionA,
-                      const ColliderObject& b, const py::object& poseB, const py::object& motionB, float scaleA,
-                      float scaleB, float tolerance) {
-    const Placed first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");
+py::object findImpact(const py::object& a, const py::object& poseA, const py::object& motionA, const py::object& b,
+                      const py::object& poseB, const py::object& motionB, float scaleA, float scaleB, float tolerance) {
+    const PlacedShape first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");
     if (!(tolerance >= 0) || !std::isfinite(tolerance))
         throw std::invalid_argument(fmt::format("tolerance is {}, and must be 0 or above, and finite", tolerance));
     Impact impact;
@@ -115,9 +115,9 @@ py::object findDistances(const py::object& colliders, const py::object& poses, c
 constexpr const char* distanceDoc =
     R"(distance(a, pose_a, b, pose_b, *, scale_a=1, scale_b=1, max_distance=inf) -> BodyDistance
 
-The signed distance of two bodies, between their triangles.
+The signed distance of two bodies. Of colliders, the triangles count.
 
-a, b: Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
+a, b: Collider or Shape, one of them a Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
 max_distance: bodies farther apart are not found.
 
 found: bool. overlap: "none", "surfaces", "a inside b" or "b inside a". distance: the separation, or minus the
@@ -151,7 +151,7 @@ constexpr const char* impactDoc =
 When two bodies touch that move from their poses by their motions, at constant velocities. They do not touch before,
 whatever their speed and however thin they are.
 
-a, b: Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
+a, b: Collider or Shape, one of them a Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
 motion_a, motion_b: displacement, and rotation vector [rad] about the pose's position, shape (2, 3); None for a body at
 rest.
 tolerance: bodies touch at this separation, in the meshes' unit; 0 for a twentieth of the smaller voxel.
@@ -159,7 +159,8 @@ tolerance: bodies touch at this separation, in the meshes' unit; 0 for a twentie
 found: bool, False if they do not touch in the whole motion; the other members are then invalid. fraction: float, of the
 motion until they touch, 0 to 1. pose_a, pose_b: Pose, then. distance: BodyDistance, then.
 
-Raises ValueError that names the argument, and for rotations by more than 1000 rad.
+Raises ValueError that names the argument, for rotations by more than 1000 rad, and for planes and triangles that
+rotate.
 
 >>> import bilayer
 >>> box = bilayer.box()

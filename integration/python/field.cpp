@@ -12,9 +12,9 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
-#include "sdf/base/unit_tolerance.h"
 #include "integration/python/cancellable.h"
 #include "integration/python/objects.h"
+#include "sdf/base/unit_tolerance.h"
 
 namespace bilayer::python {
 namespace {

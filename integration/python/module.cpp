@@ -23,6 +23,7 @@ PYBIND11_MODULE(_bilayer, module) {
     python::addBuild(module);
     python::addField(module);
     python::addPose(module);
+    python::addShape(module);
     python::addCollider(module);
     python::addContact(module);
     python::addDistance(module);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The objects behind Python's Field and Collider. Each holds how it was made, since pickles make it again.
+// The objects behind Python's Field, Collider and Shape. Each holds how it was made, since pickles make it again.
 #pragma once
 
 #include <pybind11/pybind11.h>
 
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/field.h>
+#include <bilayer/collider/shapes.h>
 
 namespace bilayer::python {
 
@@ -17,6 +18,10 @@ struct FieldObject : Field {
 };
 
 struct ColliderObject : Collider {
+    py::tuple recipe;
+};
+
+struct ShapeObject : ContactShape {
     py::tuple recipe;
 };
 

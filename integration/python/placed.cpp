@@ -22,13 +22,21 @@ Motion motionOf(const py::object& object, const char* name) {
     return {motion.points()[0], motion.points()[1]};
 }
 
+ContactShape shapeOf(const py::object& body, const char* name) {
+    if (py::isinstance<ColliderObject>(body)) return ContactShape(body.cast<const ColliderObject&>());
+    if (py::isinstance<ShapeObject>(body)) return body.cast<const ShapeObject&>();
+    throw py::type_error(
+        fmt::format("{}: expected a Collider or a Shape, got a '{}'", name, Py_TYPE(body.ptr())->tp_name));
+}
+
 }  // namespace
 
-Placed placed(const ColliderObject& collider, const py::object& pose, float scale, const py::object& motion,
-              const char* name) {
+PlacedShape placed(const py::object& body, const py::object& pose, float scale, const py::object& motion,
+                   const char* name) {
     const std::string suffix = std::string("_") + name;
     requirePositive(double(scale), ("scale" + suffix).c_str());
-    return {collider, poseOf(pose, ("pose" + suffix).c_str()), scale, motionOf(motion, ("motion" + suffix).c_str())};
+    return {shapeOf(body, name), poseOf(pose, ("pose" + suffix).c_str()), scale,
+            motionOf(motion, ("motion" + suffix).c_str())};
 }
 
 }  // namespace bilayer::python

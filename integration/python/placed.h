@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Posed colliders as arguments.
+// Posed bodies as arguments.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -12,10 +12,11 @@ namespace bilayer::python {
 
 namespace py = pybind11;
 
-/// A body from the arguments pose_NAME, scale_NAME and motion_NAME, where NAME is "a" or "b".
+/// A body from the arguments NAME, a Collider or a Shape, and pose_NAME, scale_NAME and motion_NAME, where NAME is "a"
+/// or "b".
 /// @param motion  a displacement and a rotation vector, shape (2, 3), or None
-/// Throws std::invalid_argument that names the argument.
-Placed placed(const ColliderObject& collider, const py::object& pose, float scale, const py::object& motion,
-              const char* name);
+/// Throws std::invalid_argument that names the argument, or a TypeError of Python.
+PlacedShape placed(const py::object& body, const py::object& pose, float scale, const py::object& motion,
+                   const char* name);
 
 }  // namespace bilayer::python

@@ -185,6 +185,57 @@ def test_time_of_impact(collider):
             bilayer.time_of_impact(*arguments, **options)
 
 
+SHAPES = [
+    bilayer.Shape.sphere(0.5),
+    bilayer.Shape.box((0.5, 0.5, 0.5)),
+    bilayer.Shape.capsule(0.5, 0.25),
+    bilayer.Shape.cylinder(0.5, 0.25),
+    bilayer.Shape.cone(0.5, 0.5),
+    bilayer.Shape.hull(0.5 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])),
+    bilayer.Shape.spheres([(0, 0, 0), (0, 0.2, 0)], 0.5),
+    bilayer.Shape.plane((1, 0, 0), 0.5),
+    bilayer.Shape.triangles(bilayer.Mesh([(0.5, -9, -9), (0.5, 9, -9), (0.5, 0, 9)], [(0, 1, 2)])),
+]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=repr)
+def test_shapes(collider, shape):
+    # a shape from x = -0.5 to 0.5 on the left of a box of half side 1, turned by 90 degrees about x
+    at = bilayer.Pose((-2, 0, -0.5 if "cone" in repr(shape) else 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0))
+    apart = bilayer.distance(shape, at, collider, None)
+    assert apart.found and apart.overlap == "none" and apart.distance == pytest.approx(0.5, abs=0.01)
+    assert apart.normal.tolist() == pytest.approx([-1, 0, 0], abs=0.05)
+    assert bilayer.distance(collider, None, shape, at).distance == apart.distance
+    near = bilayer.Pose(at.position + (0.51, 0, 0), at.rotation)
+    contacts = bilayer.collide(shape, near, collider, None, margin=0.1)
+    assert len(contacts.distance) and contacts.distance.min() == pytest.approx(-0.01, abs=0.01)
+    assert contacts.normal[contacts.distance.argmin()].tolist() == pytest.approx([-1, 0, 0], abs=0.1)
+    few = bilayer.collide(collider, None, shape, near, margin=0.1, reduced=True, cache=bilayer.ContactCache())
+    assert 0 < len(few.distance) <= 12 * 8
+    impact = bilayer.time_of_impact(shape, at, [[1, 0, 0], [0, 0, 0]], collider, None, None)
+    assert impact.found and impact.fraction == pytest.approx(0.5, abs=0.02)
+    again = pickle.loads(pickle.dumps(shape))
+    assert bilayer.distance(again, at, collider, None).distance == apart.distance
+    assert copy.copy(shape) is not None and bilayer.distance(copy.deepcopy(shape), at, collider, None).found
+
+
+def test_bad_shapes(collider):
+    for make, message in (
+        (lambda: bilayer.Shape.sphere(0), "radius is 0"),
+        (lambda: bilayer.Shape.box((1, -1, 1)), "half extent is -1"),
+        (lambda: bilayer.Shape.box((1, 1)), "half_extents: expected"),
+        (lambda: bilayer.Shape.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)]), "one plane"),
+        (lambda: bilayer.Shape.hull([[np.nan, 0, 0]]), r"points\[0, 0\] is nan"),
+        (lambda: bilayer.Shape.plane((0, 0, 0)), "normal"),
+        (lambda: bilayer.distance(SHAPES[0], None, SHAPES[1], None), "collider"),
+        (lambda: bilayer.time_of_impact(SHAPES[7], None, [[0, 0, 0], [0, 1, 0]], collider, None, None), "rotate"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            make()
+    with pytest.raises(TypeError, match="a: expected a Collider or a Shape, got a 'int'"):
+        bilayer.distance(1, None, collider, None)
+
+
 def test_distances(collider, random):
     poses = [bilayer.Pose(random.uniform(-8, 8, size=3)) for _ in range(12)]
     pairs = [(i, j) for i in range(12) for j in range(i)]

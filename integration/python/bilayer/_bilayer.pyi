@@ -172,6 +172,28 @@ class Collider:
 class ContactCache:
     def __init__(self) -> None: ...
 
+class Shape:
+    @staticmethod
+    def sphere(radius: float) -> Shape: ...
+    @staticmethod
+    def box(half_extents: ArrayLike) -> Shape: ...
+    @staticmethod
+    def capsule(radius: float, half_height: float) -> Shape: ...
+    @staticmethod
+    def cylinder(radius: float, half_height: float) -> Shape: ...
+    @staticmethod
+    def cone(radius: float, half_height: float) -> Shape: ...
+    @staticmethod
+    def hull(points: ArrayLike, radius: float = 0) -> Shape: ...
+    @staticmethod
+    def spheres(centres: ArrayLike, radii: ArrayLike) -> Shape: ...
+    @staticmethod
+    def plane(normal: ArrayLike, offset: float = 0) -> Shape: ...
+    @staticmethod
+    def triangles(mesh: _MeshLike) -> Shape: ...
+    def __copy__(self) -> Shape: ...
+    def __deepcopy__(self, memo: Dict[int, Any]) -> Shape: ...
+
 class Obstacle:
     @property
     def distance(self) -> _Floats: ...
@@ -245,9 +267,9 @@ def with_body(
     keep_mesh: bool = True,
 ) -> LevelSet: ...
 def collide(
-    a: Collider,
+    a: Union[Collider, Shape],
     pose_a: _PoseLike,
-    b: Collider,
+    b: Union[Collider, Shape],
     pose_b: _PoseLike,
     *,
     margin: float = 0,
@@ -259,12 +281,13 @@ def collide(
     min_normal_cosine: float = 0.3,
     min_normal_cosine_apart: float = 0.9,
     keeps_oblique_edges: bool = False,
+    reduced: bool = False,
     cache: Optional[ContactCache] = None,
 ) -> Contacts: ...
 def distance(
-    a: Collider,
+    a: Union[Collider, Shape],
     pose_a: _PoseLike,
-    b: Collider,
+    b: Union[Collider, Shape],
     pose_b: _PoseLike,
     *,
     scale_a: float = 1,
@@ -278,10 +301,10 @@ def distances(
     max_distance: float = ...,
 ) -> _Floats: ...
 def time_of_impact(
-    a: Collider,
+    a: Union[Collider, Shape],
     pose_a: _PoseLike,
     motion_a: Optional[ArrayLike],
-    b: Collider,
+    b: Union[Collider, Shape],
     pose_b: _PoseLike,
     motion_b: Optional[ArrayLike],
     *,
