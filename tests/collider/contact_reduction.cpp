@@ -141,13 +141,13 @@ TEST_CASE("Contact reduction keeps its selection until the bodies have moved, an
     for (Contact& contact : standing) contact.distance = 1e-4f;
     std::vector<Contact> approaching = standing;
     for (Contact& contact : approaching) contact.approach = std::max(0.5f * contact.position.x, 0.f);
-    bullet::detail::ContactReduction stopped;
+    ContactReduction stopped;
     stopped.update(approaching, here, here);
     REQUIRE(stopped.reduced().slack == 0);
     stopped.update(standing, here, here);
-    const auto minX = [](const bullet::detail::ReducedContacts& reduced) {
+    const auto minX = [](const ReducedContacts& reduced) {
         float least = 0;
-        for (const bullet::detail::Patch& patch : reduced.patches)
+        for (const ContactPatch& patch : reduced.patches)
             for (int i = 0; i < patch.count; ++i) least = std::min(least, patch.contacts[i].position.x);
         return least;
     };
