@@ -21,12 +21,12 @@ constexpr std::uint32_t lowestVertex = featureOfB - 1;
 
 ContactReport collideHalfSpace(const HalfSpace& solid, const Motion& motion, const Placed& field,
                                const ContactOptions& options, std::vector<Contact>& contacts) {
-    const auto& [normal, offset] = solid;
+    const glm::vec3& normal = solid.normal;
     const float margin = options.margin;
     ContactReport report;
     // The plane in the collider's own coordinates.
     const glm::vec3 up = glm::conjugate(field.pose.rotation) * normal;
-    const float height = (offset - glm::dot(normal, field.pose.position)) / field.scale;
+    const float height = (solid.offset - glm::dot(normal, field.pose.position)) / field.scale;
     const float reach = margin / field.scale;
     const LocalField local(field, {}, motion, margin, false);
     const auto above = [&](const glm::vec3& point) { return glm::dot(up, point) - height; };
