@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Buffers hold the bodies of all queries, concatenated, and grow with new bodies.
+// Tested by tests/bullet/sampled_pairs.cpp through openclPointSampler().
 #include <bilayer/cl/field.h>
 #include <bilayer/collider/contact.h>
 

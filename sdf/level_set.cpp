@@ -9,9 +9,9 @@
 #include <string_view>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/exact_error.h"
 #include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"
-#include "sdf/leaf/build_options.h"
 
 namespace bilayer {
 
@@ -67,7 +67,7 @@ std::string requireName(const openvdb::GridBase& grid, const char* entry, const 
 void requireErrorBound(const openvdb::GridBase& grid, const std::string& method, float errorBound) {
     if (!grid[metadata::errorBound]) return;
     const bool hasBound = method == nameOf(Method::exact) || method == nameOf(Method::pseudonormal);
-    const float least = hasBound ? (1 - rounding) * detail::errorBound({}) : 0, h = float(grid.voxelSize()[0]);
+    const float least = hasBound ? (1 - rounding) * exactError : 0, h = float(grid.voxelSize()[0]);
     require(errorBound >= least * h && (std::isfinite(errorBound) || !hasBound), grid, metadata::errorBound, errorBound,
             hasBound ? "finite and at least the error of its method" : "0 or above");
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Groups of contacts with similar normals: the contact patches before their reduction.
-// Tested by tests/bullet/contact_reduction.cpp through reduce().
+// Tested by tests/collider/contact_reduction.cpp through reduce().
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contacts of a body's sharp edges between its surface points, in the field of another body.
-// Tested by tests/bullet/edges.cpp through collideFields().
+// Tested by tests/bullet/edges.cpp through collide().
 #pragma once
 
 #include <algorithm>

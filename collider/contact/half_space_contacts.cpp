@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contacts between a field and a half-space.
-// Tested by tests/bullet/pairs.cpp and tests/collider/shapes.cpp.
+// Tested by tests/collider/shapes.cpp through plane().
 #include <bilayer/collider/contact.h>
 
 #include <algorithm>

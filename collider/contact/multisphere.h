@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The convex hull of spheres, which is what Bullet's multispheres are. Its surface consists of spheres, cones tangent
 // to two of them, and planes tangent to three.
+// Tested by tests/bullet/multisphere.cpp.
 #pragma once
 
 #include <glm/vec3.hpp>

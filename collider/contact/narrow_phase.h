@@ -2,7 +2,7 @@
 // Contacts between a field and other shapes. Body A is the other shape, body B the field. Speculative contacts beyond
 // the margin are made where a point's motion meets the other body. Motions are about the positions of the poses; a
 // plane's motion is about the world's origin.
-// Tested by tests/bullet/edges.cpp and tests/collider/shapes.cpp.
+// Tested by tests/bullet/edges.cpp.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Open surfaces: two-sided triangles that come one at a time. Edges with equal end points are shared.
+// Tested by tests/bullet/open_surface.cpp through collideTriangles().
 #pragma once
 
 #include <array>

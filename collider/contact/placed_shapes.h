@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pairs of placed shapes, at least one of them a collider.
-// Tested by tests/collider/shapes.cpp.
+// Tested by tests/collider/shapes.cpp through collide().
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contacts between two shapes, one of them a collider.
-// Tested by tests/collider/shapes.cpp.
+// Tested by tests/collider/shapes.cpp through collide().
 #include <bilayer/collider/contact.h>
 
 #include <cmath>

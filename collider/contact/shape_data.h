@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The data of a ContactShape.
-// Tested by tests/collider/shapes.cpp.
+// Tested by tests/collider/shapes.cpp through ContactShape.
 #pragma once
 
 #include <bilayer/collider/collider.h>

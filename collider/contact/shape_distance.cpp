@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The distance between two shapes, one of them a collider.
-// Tested by tests/collider/shape_distance.cpp.
+// Tested by tests/collider/shape_distance.cpp through distance().
 #include <bilayer/collider/distance.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The distance of a triangle mesh from convex solids and planes.
-// Tested by tests/collider/shape_distance.cpp.
+// Tested by tests/collider/shape_distance.cpp through distance().
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The winding number of a mesh around a point, by the crossings of one ray. May run on any number of threads at once,
 // and allocates nothing.
-// Tested by tests/collider/sides.cpp.
+// Tested by tests/collider/sides.cpp through closest().
 #pragma once
 
 #include <optional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // On which side of a plane through three points a fourth point lies, without rounding error; internal.
-// Tested by tests/sdf/inspect.cpp.
+// Tested by tests/sdf/inspect.cpp through inspect().
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Detects whether a polygon in the plane crosses itself; internal.
-// Tested by tests/sdf/triangulate.cpp.
+// Tested by tests/sdf/triangulate.cpp through triangulate().
 #pragma once
 
 #include <glm/vec2.hpp>

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/leaf/build_options.h"
 
+#include "sdf/base/exact_error.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,8 +17,6 @@ namespace {
 constexpr float smallestVoxel = 2e-5f;
 /// Scale factor that the error for a small voxel size suggests, applied repeatedly: metres to millimetres.
 constexpr double unitStep = 1000;
-/// Guaranteed error of exact distances [voxels]; ten times the largest observed error.
-constexpr float exactError = 1e-4f;
 /// Minimum layer distance: rounding makes closer layers indistinguishable [voxels].
 constexpr float minDelta = 0.1f;
 /// Maximum distance from a point of a triangle to its nearest sample, in units of sqrt(epsilon).

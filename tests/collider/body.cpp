@@ -263,7 +263,7 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
         requireRefusal(changed([=](Distance& grid) { grid.removeMeta(name); }), name);
     }
     requireRefusal(changed(setting("bilayer:bounds_upper", openvdb::Vec3s(0.3f, 0.2f, 0.05f))),
-                   "outside of its bounds");
+                   "outside of 'bilayer:bounds_lower'");
 
     requireRefusal(changed(setting("bilayer:measure", std::string("thumb"))), "'bilayer:measure' is thumb");
     requireRefusal(changed([](Distance& grid) { grid.removeMeta("bilayer:measure"); }), "bilayer:measure");
@@ -322,7 +322,8 @@ TEST_CASE("a damaged mesh of a body is refused, whichever byte it is") {
 
 TEST_CASE("a body with the mesh of another, or with one that is not valid, is refused") {
     const Pair other(shapes::box({0.3f, 0.2f, 0.11f}, 3), 0.02f);
-    requireRefusal(withMeshBytes(meshBytes(withBody(other.field, other.made.data().body))->value()), "of another body");
+    requireRefusal(withMeshBytes(meshBytes(withBody(other.field, other.made.data().body))->value()),
+                   "'bilayer:mesh_hash'");
     Body body = bodyOf(stored());
     Mesh bad = *body.mesh;
     bad.triangles[7].y = 1u << 30;

@@ -37,6 +37,7 @@ inline const std::map<std::string, std::string> publicFloors{
     {"collider/mass.h", "field"},
     {"collider/field.h", "field"},
     {"collider/collider.h", "contact"},
+    {"collider/shapes.h", "contact"},
     {"collider/contact.h", "contact"},
     {"collider/distance.h", "contact"},
     {"cl/device.h", "detail"},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bullet's meshes and height fields as sheets of triangles.
-// Tested by tests/bullet/sliding.cpp.
+// Tested by tests/bullet/open_surface.cpp.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Warnings of this library.
-// Tested by tests/bullet/stock.cpp.
+// Tested by tests/bullet/stock.cpp through setWarningCallback().
 #pragma once
 
 namespace bilayer::bullet::detail {
