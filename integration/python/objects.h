@@ -22,7 +22,8 @@ struct ColliderObject : Collider {
 };
 
 struct ShapeObject : ContactShape {
-    py::tuple recipe;
+    /// The name of the static function that made it, and a tuple of its arguments.
+    py::tuple call;
 };
 
 }  // namespace bilayer::python

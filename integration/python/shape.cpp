@@ -18,11 +18,17 @@
 namespace bilayer::python {
 namespace {
 
-/// @param maker, arguments  the static function of Shape that makes it again
+/// @param maker  the static function of Shape that makes it again from the arguments
 template <class... Arguments>
 ShapeObject made(ContactShape shape, const char* maker, const Arguments&... arguments) {
-    const py::object make = py::type::of<ShapeObject>().attr(maker);
-    return {std::move(shape), py::make_tuple(make, py::make_tuple(arguments...))};
+    return {std::move(shape), py::make_tuple(maker, py::make_tuple(arguments...))};
+}
+
+// As __reduce__ returns it: a static function of a native class cannot be pickled itself.
+py::tuple recipeOf(const ShapeObject& shape) {
+    const py::tuple arguments = shape.call[1];
+    const py::object call = py::module_::import("operator").attr("methodcaller")(shape.call[0], *arguments);
+    return py::make_tuple(call, py::make_tuple(py::type::of<ShapeObject>()));
 }
 
 ShapeObject makeHull(const py::object& points, double radius) {
@@ -62,9 +68,9 @@ ShapeObject makeTriangles(const py::object& mesh) {
 // As Python writes the call that made the shape.
 std::string reprOf(const ShapeObject& shape) {
     std::string arguments;
-    for (const py::handle& argument : py::tuple(shape.recipe[1]))
+    for (const py::handle& argument : py::tuple(shape.call[1]))
         arguments += (arguments.empty() ? "" : ", ") + py::repr(argument).cast<std::string>();
-    return fmt::format("Shape.{}({})", shape.recipe[0].attr("__name__").cast<std::string>(), arguments);
+    return fmt::format("Shape.{}({})", shape.call[0].cast<std::string>(), arguments);
 }
 
 constexpr const char* sphereDoc = R"(sphere(radius) -> Shape
@@ -201,7 +207,7 @@ void addShape(py::module_& module) {
             },
             py::arg("normal"), py::arg("offset") = 0., planeDoc)
         .def_static("triangles", makeTriangles, py::arg("mesh"), trianglesDoc)
-        .def("__reduce__", [](const ShapeObject& self) { return self.recipe; })
+        .def("__reduce__", recipeOf)
         .def("__copy__", [](const ShapeObject& self) { return self; })
         .def(
             "__deepcopy__", [](const ShapeObject& self, const py::dict&) { return self; }, py::arg("memo"))
