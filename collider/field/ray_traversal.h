@@ -2,7 +2,7 @@
 // The traversal of a mesh's tree along a ray, nearest nodes first. SIMD tests in single precision reject triangles
 // conservatively. Highway includes this file once for each instruction set: only between HWY_BEFORE_NAMESPACE's headers
 // and its own, after hwy/highway.h.
-// Tested by tests/collider/mesh_rays.cpp through raycast().
+// Tested by tests/collider/mesh_rays.cpp through firstHit().
 #if defined(BILAYER_COLLIDER_RAY_TRAVERSAL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_COLLIDER_RAY_TRAVERSAL_H
 #undef BILAYER_COLLIDER_RAY_TRAVERSAL_H

@@ -265,7 +265,7 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
     requireRefusal(changed(setting("bilayer:bounds_upper", openvdb::Vec3s(0.3f, 0.2f, 0.05f))),
                    "outside of 'bilayer:bounds_lower'");
 
-    requireRefusal(changed(setting("bilayer:measure", std::string("thumb"))), "'bilayer:measure' is thumb");
+    requireRefusal(changed(setting("bilayer:measure", std::string("thumb"))), "'bilayer:measure' is 'thumb'");
     requireRefusal(changed([](Distance& grid) { grid.removeMeta("bilayer:measure"); }), "bilayer:measure");
     requireRefusal(changed(setting("bilayer:mesh", 7.f)), "type float");
 

@@ -219,10 +219,10 @@ TEST_CASE("Shapes that overlap a collider are told from those inside of it and a
         float lowest = std::numeric_limits<float>::infinity();
         const glm::quat rotation = glm::angleAxis(float(random(0, 3)), random.direction());
         const BodyDistance above =
-            distance({subject.shape, {pose.toWorld({0.03f, 0.02f, 3}), pose.rotation * rotation}}, b);
+            distance({subject.shape, {pose.toWorld({0.03f, 0.02f, 3}), pose.rotation * rotation}, 0.4f}, b);
         lowest = above.distance;
         const glm::vec3 place = pose.toWorld({0.03f, 0.02f, 3 - lowest - 0.01f});
-        const BodyDistance deep = distance({subject.shape, {place, pose.rotation * rotation}}, b);
+        const BodyDistance deep = distance({subject.shape, {place, pose.rotation * rotation}, 0.4f}, b);
         CHECK(deep.overlap == Overlap::surfaces);
         CHECK(deep.distance == Approx(-0.01f).margin(0.0008));
         CHECK(glm::dot(deep.normal, up) > 0.95f);

@@ -201,7 +201,7 @@ SHAPES = [
 @pytest.mark.parametrize("shape", SHAPES, ids=repr)
 def test_shapes(collider, shape):
     # a shape from x = -0.5 to 0.5 on the left of a box of half side 1, turned by 90 degrees about x
-    at = bilayer.Pose((-2, 0, -0.5 if "cone" in repr(shape) else 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0))
+    at = bilayer.Pose((-2, 0, 0.3 if "cone" in repr(shape) else 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0))
     apart = bilayer.distance(shape, at, collider, None)
     assert apart.found and apart.overlap == "none" and apart.distance == pytest.approx(0.5, abs=0.01)
     assert apart.normal.tolist() == pytest.approx([-1, 0, 0], abs=0.05)
