@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A field on an OpenCL device, for sampling many points at once; kernel in field.cl. And a sampler of the surface points
-// of bodies in the fields of other bodies, in one batch per step; kernel in point_sampler.cl.
-// Tested by tests/cl/field.cpp and tests/bullet/sampled_pairs.cpp.
+// A field on an OpenCL device, for sampling many points at once; kernel in field.cl. And a sampler of the surface
+// points of bodies in the fields of other bodies, in one batch per step; kernel in point_sampler.cl. Tested by
+// tests/cl/field.cpp and tests/bullet/sampled_pairs.cpp.
 #pragma once
 
 #include <cstddef>

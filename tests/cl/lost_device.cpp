@@ -10,7 +10,6 @@
 
 #include <bilayer/cl/field.h>
 #include <bilayer/cl/filler.h>
-#include <bilayer/cl/field.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>

@@ -12,9 +12,9 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/dispatcher.h>
-#include "integration/bullet/detail/sampled_pairs.h"
 #include "integration/bullet/detail/convex_shape.h"
 #include "integration/bullet/detail/manifolds.h"
+#include "integration/bullet/detail/sampled_pairs.h"
 
 namespace bilayer::bullet::detail {
 
