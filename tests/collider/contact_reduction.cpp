@@ -146,10 +146,10 @@ TEST_CASE("Contact reduction keeps its selection until the bodies have moved, an
     REQUIRE(stopped.reduced().slack == 0);
     stopped.update(standing, here, here);
     const auto minX = [](const ReducedContacts& reduced) {
-        float least = 0;
+        float lowest = 0;
         for (const ContactPatch& patch : reduced.patches)
-            for (int i = 0; i < patch.count; ++i) least = std::min(least, patch.contacts[i].position.x);
-        return least;
+            for (int i = 0; i < patch.count; ++i) lowest = std::min(lowest, patch.contacts[i].position.x);
+        return lowest;
     };
     CHECK(minX(stopped.reduced()) < -0.09f);
 }
