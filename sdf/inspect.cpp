@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -32,6 +33,10 @@ namespace {
 
 /// Fraction of the area that commonWall excludes: creases and convex vertices, which most meshes have.
 constexpr double uncommonArea = 0.01;
+/// Rays behind this fraction of the area, estimated from one leaf in `sampling`, are followed to their exit. So all
+/// thin walls are measured, and most rays end early.
+constexpr double measuredArea = 2 * uncommonArea;
+constexpr std::size_t sampling = 32;
 /// Relative volume that exceeds rounding, in units of the volume of a cube with the same area (approximately).
 constexpr double clearVolume = 1e-6;
 
@@ -193,8 +198,8 @@ float finiteOrZero(float thickness) {
     return std::isfinite(thickness) ? thickness : 0.f;
 }
 
-// Returns the thickness that only uncommonArea of the area stays below.
-float commonThickness(const std::vector<float>& thickness, const Measures& measures, double area) {
+// Returns the thickness that triangles of this area stay below; infinite if there are not so many.
+float thicknessAt(double area, const std::vector<float>& thickness, const Measures& measures) {
     // Sorted by thickness, then by index: the bit patterns of positive floats have the same order as their values.
     LargeArray<std::uint64_t> order(thickness.size());
     forAll(order.size(),
@@ -211,17 +216,24 @@ float commonThickness(const std::vector<float>& thickness, const Measures& measu
         }
         const auto triangle = std::uint32_t(order[i]);
         below += measures.areas[triangle];
-        if (below > uncommonArea * area) return finiteOrZero(thickness[triangle]);
+        if (below > area) return thickness[triangle];
     }
-    return 0;
+    return std::numeric_limits<float>::infinity();
 }
 
 void findThinWalls(const TriangleTree& tree, const Measures& measures, float wall, MeshReport& report,
                    Progress& progress) {
     if (!(report.bounds.longestSide() > 0)) return;
-    const std::vector<float> thickness = wallThickness(tree, &progress);
+    const std::vector<float> sample = wallThickness(tree, {.stride = sampling}, &progress);
+    WallSearch search{std::max(wall, thicknessAt(measuredArea * report.area / double(sampling), sample, measures))};
+    std::vector<float> thickness = wallThickness(tree, search, &progress);
+    float common = thicknessAt(uncommonArea * report.area, thickness, measures);
+    if (!(common < search.limit) && std::isfinite(search.limit)) {
+        thickness = wallThickness(tree, {}, &progress);
+        common = thicknessAt(uncommonArea * report.area, thickness, measures);
+    }
     report.thinnestWall = finiteOrZero(*std::min_element(thickness.begin(), thickness.end()));
-    report.commonWall = commonThickness(thickness, measures, report.area);
+    report.commonWall = finiteOrZero(common);
     report.thinWalls =
         std::size_t(std::count_if(thickness.begin(), thickness.end(), [&](float t) { return t < wall; }));
 }

@@ -77,7 +77,7 @@ constexpr float minDirection = 1e-20f;
 // A ray's search for its nearest exit.
 class ExitSearch {
   public:
-    ExitSearch(const TriangleTree& tree, const Ray& ray) : tree_(tree), ray_(ray) {
+    ExitSearch(const TriangleTree& tree, const Ray& ray, float limit) : tree_(tree), ray_(ray), nearest_(limit) {
         // margin around boxes for rounding [m]
         const float room = rounding * tree.largestCoordinate();
         for (int k = 0; k < 3; ++k) {
@@ -150,13 +150,14 @@ class ExitSearch {
 
     const TriangleTree& tree_;
     const Ray& ray_;
-    float nearest_ = infinite;
+    float nearest_;
     bool forward_[3];                         // for each axis
     float inverse_[3], enter_[3], leave_[3];  // a plane at x is crossed at x * inverse + enter (or leave)
 };
 
-float nearestExit(const TriangleTree& tree, const Ray& ray) {
-    return ExitSearch(tree, ray).run();
+float nearestExit(const TriangleTree& tree, const Ray& ray, float limit) {
+    const float along = ExitSearch(tree, ray, limit).run();
+    return along < limit ? along : infinite;
 }
 
 }  // namespace
@@ -168,23 +169,27 @@ namespace bilayer::detail {
 namespace {
 HWY_EXPORT(nearestExit);
 
-float thicknessBehind(const TriangleTree& tree, const Triangle& t) {
+float thicknessBehind(const TriangleTree& tree, const Triangle& t, float limit) {
     const glm::dvec3 a(t.a), b(t.b), c(t.c);
     const glm::vec3 normal(0.5 * glm::cross(b - a, c - a));
     const float length = glm::length(normal);
     if (!(length > 0)) return infinite;
-    return HWY_DYNAMIC_DISPATCH(nearestExit)(tree, {(t.a + t.b + t.c) / 3.f, -normal / length});
+    return HWY_DYNAMIC_DISPATCH(nearestExit)(tree, {(t.a + t.b + t.c) / 3.f, -normal / length}, limit);
 }
 
 }  // namespace
 
-std::vector<float> wallThickness(const TriangleTree& tree, Progress* progress) {
-    std::vector<float> thickness(tree.triangleCount());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.boxes().leafCount, 64), [&](const auto& range) {
+std::vector<float> wallThickness(const TriangleTree& tree, const WallSearch& search, Progress* progress) {
+    std::vector<float> thickness(tree.triangleCount(), infinite);
+    const std::size_t leaves = (tree.boxes().leafCount + search.stride - 1) / search.stride;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves, 64), [&](const auto& range) {
         poll(progress);
-        for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf)
+        for (std::size_t n = range.begin(); n < range.end(); ++n) {
+            const std::size_t leaf = n * search.stride;
             for (std::size_t i = 0; i < tree.leafSize(leaf); ++i)
-                thickness[tree.leaf(leaf).triangles[i]] = thicknessBehind(tree, Triangle(tree.leaf(leaf), i));
+                thickness[tree.leaf(leaf).triangles[i]] =
+                    thicknessBehind(tree, Triangle(tree.leaf(leaf), i), search.limit);
+        }
     });
     return thickness;
 }
