@@ -26,8 +26,9 @@ cp "$packages"/*.deb "$root/packages/"
 cp -r "$source/tests/package/consumer" "$root/user/"
 cp "$source/tests/package/parent/main.cpp" "$root/user/cube.cpp"
 cp -L /etc/resolv.conf /etc/hosts "$root/etc/"
-chroot "$root" bash -euo pipefail <<'IN_ROOT'
-export DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8
+# nothing of this machine's environment but its proxies
+chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 \
+  http_proxy="${http_proxy:-}" https_proxy="${https_proxy:-}" bash -euo pipefail <<'IN_ROOT'
 cd /user
 apt-get update -qq
 install() { apt-get install -y -qq --no-install-recommends "$@" >/tmp/apt.log 2>&1 || { cat /tmp/apt.log; exit 1; }; }
