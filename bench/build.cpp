@@ -175,9 +175,9 @@ void printSummary(const std::vector<Row>& rows, const Required& required) {
             const double mean = geometricMean(summary.ratios),
                          smallest = *std::min_element(summary.ratios.begin(), summary.ratios.end());
             const bool held = builder == Builder::exact || builder == Builder::doubleLayer;
-            const double least = builder == Builder::exact ? required.exact : required.doubleLayer;
+            const double requiredMean = builder == Builder::exact ? required.exact : required.doubleLayer;
             fmt::print("  {:<20} half width {}: geometric mean {}, minimum {} at {}\n", nameOf(builder), halfWidth,
-                       held ? judged(mean, least) : fmt::format("{:.1f}", mean),
+                       held ? judged(mean, requiredMean) : fmt::format("{:.1f}", mean),
                        held ? judged(smallest, required.cell) : fmt::format("{:.1f}", smallest), summary.slowestCell);
         }
     fmt::print("Times as fast on 2 threads as on 1\n");

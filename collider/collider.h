@@ -34,8 +34,8 @@ struct ColliderOptions {
     float pointSpacingVoxels = 2.0f;
     /// Contacts are created up to this separation [m], at most 1000 voxels. Negative: one voxel of the field.
     float margin = -1;
-    /// ContactAccuracy::exactNearFeatures queries the triangles where samples are off by more than a tenth of a voxel
-    /// (see InterpolationErrorMask). Both exact modes keep the mesh in memory (see Field) and take a microsecond per
+    /// ContactAccuracy::exactNearFeatures queries the triangles where samples are off by more than a tenth of a
+    /// voxel. Both exact modes keep the mesh in memory (see Field) and take a microsecond per
     /// triangle to build. With ContactAccuracy::exact, time grows with the contact count. Use it for parts that fit
     /// into each other to a fraction of a voxel.
     ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures;
@@ -46,7 +46,7 @@ class Collider {
   public:
     /// Builds a collider from a mesh and the level set that was built from it. Inward-facing triangles are flipped, as
     /// in build(). If the signs come from winding numbers, holes are filled with triangles and cracks up to a hundredth
-    /// of a voxel are closed (see fillHoles()). A level set of the closed mesh is then built, with the same voxel size
+    /// of a voxel are closed. A level set of the closed mesh is then built, with the same voxel size
     /// and band widths. Distances and normals are thus defined at the former holes too. Throws std::invalid_argument
     /// for a mesh that fails validate(), for invalid options, and if the level set belongs to another mesh.
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "collider/field/field_data.h"
+#include "sdf/base/method_names.h"
 #include "sdf/sign/sign_choice.h"
 
 namespace bilayer {
@@ -15,8 +16,8 @@ FieldData::FieldData(const LevelSet& levelSet, Storage storage)
     : FieldLayout(levelSet, storage),
       kernels(sampleKernels(storage)),
       coarse(clearance()),
-      signedByNormals(levelSet.sign() == "normals"),
-      signedByWinding(signedByNormals || levelSet.sign() == "winding"),
+      signedByNormals(levelSet.sign() == nameOf(Sign::normals)),
+      signedByWinding(signedByNormals || levelSet.sign() == nameOf(Sign::winding)),
       sampleError(levelSet.errorBound() + (storage == Storage::fixed16 ? step : 0)) {
     fillLanes();
 }

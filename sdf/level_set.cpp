@@ -20,11 +20,11 @@ using namespace detail;
 namespace {
 
 /// Range of voxel sizes [m]: squared lengths from 1/1000 voxel to thousands of voxels stay within the float range.
-constexpr double smallestVoxel = 1e-15, largestVoxel = 1e15;
+constexpr double minStoredVoxel = 1e-15, maxStoredVoxel = 1e15;
 /// Maximum distance of voxel (0, 0, 0) from the origin [voxels]: floats cannot separate voxels farther away.
-constexpr double farthestOrigin = double(std::uint64_t(1) << 40);
+constexpr double maxOrigin = double(std::uint64_t(1) << 40);
 /// Maximum band width [voxels]: a wider band is treated as file damage.
-constexpr float widestBand = 1 << 23;
+constexpr float maxBandWidth = 1 << 23;
 /// Tolerance of an error bound, which was rounded when it was multiplied by the voxel size.
 constexpr float rounding = 1e-5f;
 /// The empty name is for fields from other programs.
@@ -51,8 +51,8 @@ void require(bool holds, const openvdb::GridBase& grid, const char* entry, const
 }
 
 void requireWidth(const openvdb::GridBase& grid, const char* entry, float width) {
-    require(width > 0 && std::isnormal(width) && double(width) <= double(widestBand) * grid.voxelSize()[0], grid, entry,
-            width, "above 0 and at most 2^23 voxels");
+    require(width > 0 && std::isnormal(width) && double(width) <= double(maxBandWidth) * grid.voxelSize()[0], grid,
+            entry, width, "above 0 and at most 2^23 voxels");
 }
 
 std::string requireName(const openvdb::GridBase& grid, const char* entry, const auto& names) {
@@ -90,7 +90,7 @@ void requireLevelSet(const Grids& grids) {
     if (!grid.hasUniformVoxels() || !grid.transform().isLinear())
         throw std::invalid_argument(fmt::format("grid '{}' has voxels that are no cubes", grid.getName()));
     const double h = grid.voxelSize()[0];
-    require(h >= smallestVoxel && h <= largestVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
+    require(h >= minStoredVoxel && h <= maxStoredVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
     requireWidth(grid, "the background", grid.background());
     if (grid.activeVoxelCount() == 0) throw std::invalid_argument(fmt::format("grid '{}' is empty", grid.getName()));
     // Requires a shift by whole voxels along the axes: queries work in index space and must not need a rotation.
@@ -103,7 +103,7 @@ void requireLevelSet(const Grids& grids) {
             !grid.worldToIndex(world).eq(unit, 1e-3))
             throw std::invalid_argument(
                 fmt::format("grid '{}' is rotated, mirrored or shifted by parts of a voxel", grid.getName()));
-        require(std::abs(origin[axis]) <= farthestOrigin, grid, "the shift", origin[axis], "at most 2^40 voxels");
+        require(std::abs(origin[axis]) <= maxOrigin, grid, "the shift", origin[axis], "at most 2^40 voxels");
     }
 }
 

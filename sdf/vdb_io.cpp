@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -27,6 +28,9 @@ using namespace detail;
 
 namespace {
 
+/// Max error of a voxel's edge in a file, relative: a hundredth of a voxel over a thousand voxels.
+constexpr double maxVoxelRounding = 1e-5;
+
 template <class Grid>
 typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
     for (const auto& base : grids)
@@ -47,6 +51,17 @@ void shift(openvdb::GridBase& grid, const glm::dvec3& by) {
     grid.setTransform(shifted);
 }
 
+/// Far from zero, OpenVDB finds the edge of a voxel as the difference of two rounded positions.
+void requireVoxels(const openvdb::GridBase& grid) {
+    const double away = grid.indexToWorld(openvdb::Vec3d(0)).length() / grid.voxelSize()[0];  // [voxels]
+    const double rounding = 0.5 * std::numeric_limits<double>::epsilon() * away;
+    if (rounding <= maxVoxelRounding) return;
+    throw std::invalid_argument(fmt::format(
+        "grid '{}' lies {:.3g} voxels from zero, where a file rounds voxels by {:.1g} of their size and {:g} is "
+        "allowed: move the mesh closer to zero, or take larger voxels",
+        grid.getName(), away, rounding, maxVoxelRounding));
+}
+
 /// Returns the origin of the mesh from which a field in a file was built.
 glm::dvec3 originOf(const openvdb::GridPtrVec& grids) {
     for (const auto& grid : grids)
@@ -62,6 +77,7 @@ glm::dvec3 originOf(const openvdb::GridPtrVec& grids) {
 openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const LevelSet& levelSet) {
     const openvdb::GridBase::Ptr copy = openvdb::ConstPtrCast<openvdb::GridBase>(grid)->copyGrid();
     shift(*copy, levelSet.origin());
+    requireVoxels(*copy);
     return copy;
 }
 

@@ -164,7 +164,7 @@ Json toJson(const Mesh& mesh, bool balanced) {
             {"triangles", mesh.triangles.size()},
             {"bounds", box(bounds(mesh), mesh.origin)},
             {"origin", vector(mesh.origin)},
-            {"closedAndOriented", balanced}};
+            {"balanced", balanced}};
 }
 
 void addRows(Table& table, const Mesh& mesh, bool balanced) {
@@ -172,7 +172,8 @@ void addRows(Table& table, const Mesh& mesh, bool balanced) {
     table.row("triangles", grouped(mesh.triangles.size()));
     table.row("bounds", boxText(bounds(mesh), mesh.origin));
     addOrigin(table, mesh.origin);
-    table.row("closed, oriented", balanced ? "yes: every edge has balanced half-edges" : "no (--report shows why)");
+    table.row("edges", balanced ? "balanced: each is used equally often in both directions"
+                                : "not balanced: the mesh is open or not oriented (--report shows where)");
 }
 
 Json toJson(const ReadReport& read) {

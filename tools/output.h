@@ -54,7 +54,7 @@ Json toJson(const MeshReport& report, float wall);
 void addRows(Table& table, const MeshReport& report, float wall);
 
 /// The properties of a mesh that are known without inspection.
-/// @param balanced  whether every edge has balanced half-edges: balanced() in sign_choice.h
+/// @param balanced  whether every edge is used equally often in both directions: balanced() in sign_choice.h
 Json toJson(const Mesh& mesh, bool balanced);
 void addRows(Table& table, const Mesh& mesh, bool balanced);
 

@@ -13,10 +13,8 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t maxCounters = 1 << 22;   // maximum over all runs: 16 MiB
-constexpr std::size_t trianglesPerRun = 8192;  // triangles per item, where items have separate counters
-constexpr std::size_t runsPerUnit = 8;         // enough to balance unequal runs
-constexpr std::size_t itemsPerUnit = 2048;     // items that a GPU's unit holds
+constexpr std::size_t runsPerUnit = 8;      // enough to balance unequal runs
+constexpr std::size_t itemsPerUnit = 2048;  // items that a GPU's unit holds
 
 BrickGrid gridFor(const FillJob& job, float reach, float margin) {
     BrickGrid grid{};
@@ -49,7 +47,7 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
     const std::size_t units = std::max(1u, device.info.computeUnits), count = mesh.triangles.size();
     const std::size_t items =
         gpuMapping ? std::min((count + groupItems - 1) / groupItems * groupItems, units * itemsPerUnit)
-                   : std::max<std::size_t>(1, std::min({units * runsPerUnit, maxCounters / grid_.cells,
+                   : std::max<std::size_t>(1, std::min({units * runsPerUnit, maxBinCounters / grid_.cells,
                                                         (count + trianglesPerRun - 1) / trianglesPerRun}));
     grid_.runs = gpuMapping ? 1 : cl_uint(items);
     const auto uploaded = [&](const auto& data) {

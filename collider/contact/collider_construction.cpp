@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "collider/contact/collider_data.h"
+#include "sdf/base/method_names.h"
 #include "sdf/mesh/topology.h"
 #include "sdf/sign/fill_holes.h"
 #include "sdf/sign/sign_choice.h"
@@ -57,7 +58,7 @@ struct Filled {
 
 // Fills the gaps that winding numbers treat as surface, so that they have distances and normals of their own.
 Filled filledMesh(Mesh outward, const LevelSet& levelSet) {
-    if (levelSet.sign() != "winding" || levelSet.meshHash() == 0) return {std::move(outward), std::nullopt};
+    if (levelSet.sign() != nameOf(Sign::winding) || levelSet.meshHash() == 0) return {std::move(outward), std::nullopt};
     FilledMesh filled = fillHoles(std::move(outward), double(crackWidth * levelSet.voxelSize()));
     if (!filled.changed) return {std::move(filled.mesh), std::nullopt};
     const float voxelSize = levelSet.voxelSize();

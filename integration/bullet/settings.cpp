@@ -11,8 +11,11 @@
 #include <tuple>
 
 #include "collider/field/interpolant.h"
+#include "sdf/leaf/build_options.h"
 
 namespace bilayer::bullet {
+
+using bilayer::detail::minVoxelSize;
 
 namespace {
 
@@ -25,7 +28,6 @@ constexpr float gapVoxels = 2;
 // the memory.
 constexpr float minResolution = 64, maxResolution = 512;
 constexpr float rounding = 1e-3f;  // [voxels] and steps: numbers within this of an integer count as integers
-constexpr float minVoxel = 2e-5f;  // [m] the minimum of OpenVDB
 constexpr float maxIndex = 1e9f;   // maximum coordinate of a field [voxels]
 // Interior band width [voxels]: the minimum for shallow penetration, and the width beyond which CCD or shorter steps
 // are cheaper than more voxels.
@@ -54,10 +56,10 @@ void requireSensible(const MeshReport& mesh, const SceneRequirements& scene) {
         if (!(value >= minimum && std::isfinite(value)))
             throw std::invalid_argument(
                 fmt::format("advice: a {} of {}; it must be finite, and {} at least", name, value, minimum));
-    if (scene.voxelSize > 0 && scene.voxelSize < minVoxel)
+    if (scene.voxelSize > 0 && scene.voxelSize < minVoxelSize)
         throw std::invalid_argument(
             fmt::format("advice: a voxel size of {}; no field has voxels below {:g}: scale the mesh up",
-                        scene.voxelSize, minVoxel));
+                        scene.voxelSize, minVoxelSize));
     if (scene.voxelSize > 0 && mesh.bounds.longestSide() / scene.voxelSize > maxIndex)
         throw std::invalid_argument(fmt::format(
             "advice: a voxel size of {}; no field has more than {:g} voxels in a row", scene.voxelSize, maxIndex));
@@ -74,7 +76,7 @@ float chosenVoxel(const SceneRequirements& scene, float longestSide, float wall)
     float voxel = longestSide / minResolution;
     if (wall > 0) voxel = std::min(voxel, wall / wallVoxels);
     if (scene.gap > 0) voxel = std::min(voxel, scene.gap / gapVoxels);
-    return std::max({voxel, longestSide / maxResolution, minVoxel});
+    return std::max({voxel, longestSide / maxResolution, minVoxelSize});
 }
 
 // Estimates from area and volume, exact to first order in the curvature. Leaves are counted on both sides of the

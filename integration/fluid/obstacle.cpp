@@ -29,8 +29,8 @@ using openvdb::Vec3SGrid;
 using openvdb::Vec3STree;
 using openvdb::math::Transform;
 
-constexpr float minHalfWidth = 3, maxHalfWidth = 1000;  // [voxels]
-constexpr double axisTolerance = 1e-9;                  // tolerance of a cosine of 1
+constexpr float maxHalfWidth = 1000;    // [voxels]
+constexpr double axisTolerance = 1e-9;  // tolerance of a cosine of 1
 // The number of a corner has bit 4 for the upper x, 2 for y, 1 for z. Each tetrahedron runs from corner 0 to corner 7
 // along three edges, in one of the orders of the axes.
 constexpr int tetrahedra[6][4] = {{0, 4, 6, 7}, {0, 4, 5, 7}, {0, 2, 6, 7}, {0, 2, 3, 7}, {0, 1, 5, 7}, {0, 1, 3, 7}};

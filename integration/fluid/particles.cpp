@@ -15,6 +15,7 @@
 
 #include "collider/field/interpolant.h"
 #include "integration/fluid/detail/placement.h"
+#include "integration/fluid/detail/regrid.h"
 #include "sdf/base/openvdb_points.h"
 #include "sdf/base/polled_loop.h"
 
@@ -32,9 +33,9 @@ using openvdb::Vec3d;
 
 constexpr int blockSide = 8;  // edge of a task's block: a leaf [voxels]
 constexpr int maxPerVoxel = 1000;
-constexpr double farOutside = 1;  // distance at a voxel's centre beyond which no part of it is inside [voxels]
-constexpr int jitterBits = 21;    // bits of a coordinate: three fit into one hash
-constexpr double maxBlocks = 1 << 28, maxIndex = 1 << 29;  // limits of a body's box in a solver's voxels
+constexpr double farOutside = 1;       // distance at a voxel's centre beyond which no part of it is inside [voxels]
+constexpr int jitterBits = 21;         // bits of a coordinate: three fit into one hash
+constexpr double maxBlocks = 1 << 28;  // of a body's box in a solver's voxels
 
 // S. Vigna's splitmix64: every bit of the output depends on every bit of the input.
 std::uint64_t mix(std::uint64_t x) {

@@ -23,7 +23,6 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 
-constexpr float minHalfWidth = 3;  // [voxels], required by checkLevelSet
 constexpr float rounding = 1e-5f;  // tolerance of a half width that is a whole number of voxels
 
 [[noreturn]] void refuse(const std::string& why) {

@@ -21,7 +21,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t runLength = 1 << 15;           // points
+constexpr std::size_t pointsPerRun = 1 << 15;        // points
 constexpr std::size_t sampleLength = 1 << 11;        // points in the sample at the start of a run
 constexpr std::size_t pointsPerPartition = 1 << 12;  // approximate
 constexpr std::size_t maxPartitions = 1 << 10;
@@ -74,7 +74,7 @@ class EqualPoints {
         : points_(points),
           progress_(progress),
           first_(points.size()),
-          runs_((points.size() + runLength - 1) / runLength),
+          runs_((points.size() + pointsPerRun - 1) / pointsPerRun),
           partitions_(std::min(maxPartitions, std::bit_ceil(points.size() / pointsPerPartition + 1))) {}
 
     LargeArray<unsigned> find() && {
@@ -106,8 +106,8 @@ class EqualPoints {
         tbb::parallel_for(std::size_t(0), count, polled);
     }
 
-    std::size_t beginOf(std::size_t run) const { return run * runLength; }
-    std::size_t endOf(std::size_t run) const { return std::min(points_.size(), beginOf(run) + runLength); }
+    std::size_t beginOf(std::size_t run) const { return run * pointsPerRun; }
+    std::size_t endOf(std::size_t run) const { return std::min(points_.size(), beginOf(run) + pointsPerRun); }
     // Uses the upper bits, because tables use the lower ones.
     std::size_t partitionOf(std::uint64_t hash) const { return (hash >> 32) & (partitions_ - 1); }
 

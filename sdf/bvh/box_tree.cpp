@@ -25,8 +25,8 @@ static_assert(curveCells == 1u << bitsPerAxis && maxOnCurve == std::size_t(1) <<
 constexpr int digitBits = 12;
 constexpr std::size_t digits = std::size_t(1) << digitBits;
 static_assert(keyBits % digitBits == 0 && keyBits + indexBits == 64);
-constexpr std::size_t runLength = 1 << 15;  // keys that one task sorts at a time; greater than `digits`
-constexpr std::size_t grain = 1024;         // groups per task
+constexpr std::size_t keysPerRun = 1 << 15;  // keys that one task sorts at a time; greater than `digits`
+constexpr std::size_t grain = 1024;          // groups per task
 /// Min count of items for which splitting starts another task.
 constexpr std::size_t worthSplitting = 1 << 15;
 /// On average, each round of the selection halves the range until it is short. After this many rounds std::nth_element
@@ -210,14 +210,14 @@ void makeCurveKeys(CurveCells& cells, std::size_t first, std::size_t count, std:
 
 // A radix sort with parallel runs.
 void sortCurveKeys(std::vector<std::uint64_t>& keys, Progress* progress) {
-    const std::size_t runs = (keys.size() + runLength - 1) / runLength;
+    const std::size_t runs = (keys.size() + keysPerRun - 1) / keysPerRun;
     auto other = vectorOf<std::uint64_t>(keys.size(), progress);
     std::vector<std::uint32_t> places(runs * digits);
     for (int shift = indexBits; shift < 64; shift += digitBits) {
         const auto forRun = [&](std::size_t run, auto body) {
             poll(progress);
             std::uint32_t* counts = places.data() + run * digits;
-            for (std::size_t i = run * runLength; i < std::min(keys.size(), (run + 1) * runLength); ++i)
+            for (std::size_t i = run * keysPerRun; i < std::min(keys.size(), (run + 1) * keysPerRun); ++i)
                 body(keys[i], counts[keys[i] >> shift & (digits - 1)]);
         };
         tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {

@@ -87,6 +87,8 @@ void fillDoubleLayer(const MeshJob& job, const Bounds& box, const DoubleLayerOpt
         LayerBrickFiller(job, options, parameters, reach, bins, scratch.local()).fill(brick);
         job.progress.advance();
     });
+    if (job.undecided)
+        for (const LayerBrickScratch& one : scratch) *job.undecided += one.block.undecided;
 }
 
 }  // namespace bilayer::detail

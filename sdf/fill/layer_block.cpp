@@ -164,21 +164,26 @@ HWY_INLINE void putRows(D tag, hn::Vec<D> values, int part, T* corner) {
 }
 
 // Eq. 3: combines both layers into signed distances. Inside voxels keep their sign bit where the distance is clamped to
-// zero.
+// zero. Counts the voxels that are off the surface and equally near to both layers.
 template <class Nearest>
 HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels& v, const FillParameters& parameters,
-                        int part, float* distances, std::int32_t* triangles) {
+                        int part, float* distances, std::int32_t* triangles, std::size_t& undecided) {
     const Tag tag;
+    const Vec offSurface2 = hn::Set(tag, (parameters.delta + 0.5f) * (parameters.delta + 0.5f)),
+              tie = hn::Set(tag, layerTie);
     const Vec delta = hn::Set(tag, parameters.delta), certain2 = hn::Set(tag, parameters.certain * parameters.certain);
     for (int x = 0; x < cubeSide; ++x) {
         const int slice = x * blockSide * blockSide;
         const Vec inner2 = hn::Min(inner.distance2(v, x), certain2), outer2 = hn::Min(outer.distance2(v, x), certain2);
         // If only the outer layer is within the certain distance, a tie does not mean inside.
-        const auto inside = hn::And(hn::Lt(inner2, certain2), hn::Le(inner2, hn::Add(outer2, hn::Set(tag, layerTie))));
+        const auto inside = hn::And(hn::Lt(inner2, certain2), hn::Le(inner2, hn::Add(outer2, tie)));
         const Vec other2 = hn::Max(hn::Max(inner2, outer2), hn::Zero(tag));
         const Vec clamped = hn::Max(hn::Sub(hn::Sqrt(other2), delta), hn::Zero(tag));
         const Vec phi = hn::IfThenElse(inside, hn::Neg(clamped), clamped);
         const auto known = hn::Lt(hn::Min(inner2, outer2), certain2);
+        const auto tied =
+            hn::And(known, hn::And(hn::Gt(other2, offSurface2), hn::Le(hn::Abs(hn::Sub(inner2, outer2)), tie)));
+        undecided += hn::CountTrue(tag, tied);
         putRows(tag, hn::IfThenElse(known, phi, hn::Set(tag, infinite)), part, distances + slice);
         if (triangles)
             putRows(IntTag(), hn::IfThenElse(hn::RebindMask(IntTag(), inside), outer.owner[x], inner.owner[x]), part,
@@ -235,7 +240,7 @@ bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScra
         const Nearest<cube, withOwners> nearestInner(input, inner, middle, voxels),
             nearestOuter(input, outer, middle, voxels);
         combine(nearestInner, nearestOuter, voxels, input.parameters, part, distances + corner,
-                withOwners ? triangles + corner : nullptr);
+                withOwners ? triangles + corner : nullptr, scratch.undecided);
     }
     return true;
 }

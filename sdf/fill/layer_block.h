@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -31,6 +32,7 @@ struct LayerScratch {
     };
     Layer inner, outer;
     std::vector<LayerSamples::SampleRange> near;
+    std::size_t undecided = 0;  ///< voxels so far that are off the surface and equally near to both layers
 };
 
 /// Fills a block with signed distances [voxels]; +infinity where unknown. Returns whether any sample reaches the block;

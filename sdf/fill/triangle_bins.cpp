@@ -16,12 +16,10 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr int smallestShift = 5;              // bricks of at least 32 voxels a side: their data fits a core's own cache
-constexpr double maxCells = 1 << 22;          // maximum cell count, 16 MiB of counters; larger boxes get larger bricks
-constexpr std::size_t maxCounters = 1 << 22;  // over all runs: 16 MiB
-constexpr std::size_t trianglesPerRun = 8192;  // work of one task
-constexpr std::size_t runsPerThread = 8;       // enough to balance unequal runs
-constexpr std::size_t trianglesAhead = 16;     // prefetch distance of corners: about the memory latency
+constexpr int smallestShift = 5;            // bricks of at least 32 voxels a side: their data fits a core's own cache
+constexpr double maxCells = 1 << 22;        // maximum cell count, 16 MiB of counters; larger boxes get larger bricks
+constexpr std::size_t runsPerThread = 8;    // enough to balance unequal runs
+constexpr std::size_t trianglesAhead = 16;  // prefetch distance of corners: about the memory latency
 
 // Rounds down. Faster than std::floor without SSE 4.1. Valid for |value| < 2^31.
 int floorToInt(double value) {
@@ -95,7 +93,7 @@ class Binner {
         // A counting sort, stable for any run count: count in each run, compute offsets, scatter.
         const std::size_t count = mesh_.triangles.size(), cells = range_.cells();
         const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
-        const std::size_t runs = std::max<std::size_t>(1, std::min({threads * runsPerThread, maxCounters / cells,
+        const std::size_t runs = std::max<std::size_t>(1, std::min({threads * runsPerThread, maxBinCounters / cells,
                                                                     (count + trianglesPerRun - 1) / trianglesPerRun}));
         std::vector<std::uint32_t> cursors(runs * cells, 0);
         const auto codes = std::make_unique_for_overwrite<FewBricks[]>(count);

@@ -30,6 +30,11 @@ struct TriangleBins {
     }
 };
 
+/// Runs of triangles are binned with counters of their own, one per brick. Max counters over all runs: 16 MiB.
+inline constexpr std::size_t maxBinCounters = 1 << 22;
+/// Triangles of a run, the work of one task.
+inline constexpr std::size_t trianglesPerRun = 8192;
+
 /// Bins triangles into bricks. A brick may contain triangles that reach none of its voxels. Throws Cancelled.
 /// @param box       bounds of the mesh
 /// @param reach     maximum distance of a voxel from a triangle that affects it [voxels]

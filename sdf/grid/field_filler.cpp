@@ -28,6 +28,9 @@
 namespace bilayer::detail {
 namespace {
 
+/// Fraction of the voxels that may be equally near to both layers by chance. On clean meshes it is below 3e-4.
+constexpr double maxTies = 1e-3;
+
 // Returns the distances of blocks, negated where another field of the same surface is negative.
 std::vector<float> withSides(const openvdb::FloatGrid& sides, const FilledBlocks& blocks) {
     std::vector<float> distances(blocks.distances.begin(), blocks.distances.end());
@@ -68,18 +71,25 @@ void FieldFiller::fillWithOwnSigns() {
     FillParameters parameters = fillParameters(options_);
     if (prism) parameters.reach = reachOf(options_, Sign::normals);
     Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
+    std::atomic<std::size_t> undecided = 0;
     const MeshJob job{mesh_,
                       options_.voxelSize,
                       parameters.reach,
                       options_.triangles,
                       true,
                       [&](const FilledBlocks& blocks) { take(assembler, blocks); },
-                      progress_};
+                      progress_,
+                      {},
+                      &undecided};
     if (device_)
         device_->fill({job, options_, extent_.box, parameters});
     else
         fillDoubleLayer(job, extent_.box, options_.doubleLayer, parameters);
     times_.fill += part.lap();
+    signs_.undecided = undecided;
+    if (double(undecided) > maxTies * double(filledBlocks_ * blockVoxels))
+        signs_.reason +=
+            fmt::format(", but for {} voxels both are equally near: their side is unknown", undecided.load());
     finish(assembler);
     times_.assemble += part.lap();
 }

@@ -20,8 +20,6 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t partBytes = 1 << 17;  // bytes of text per task
-
 /// What is omitted from a file.
 enum Omission { pointsAndLines, freeForm, unknown, omissions };
 struct OmissionName {
@@ -179,7 +177,7 @@ bool endsWithJoint(const char* begin, const char* end) {
 std::vector<ObjPart> cut(const TextSource& source) {
     std::vector<ObjPart> parts;
     for (const char* begin = source.begin(); begin != source.end();) {
-        const char* end = begin + std::min<std::size_t>(partBytes, std::size_t(source.end() - begin));
+        const char* end = begin + std::min<std::size_t>(textPartBytes, std::size_t(source.end() - begin));
         while (end != source.end() && !(isLineEnd(end[-1]) && !isLineEnd(*end))) ++end;
         const char* last = end;
         while (last != begin && isLineEnd(last[-1])) --last;

@@ -22,7 +22,6 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::size_t headerBytes = 80, facetBytes = 50, normalBytes = 12;
-constexpr std::size_t partBytes = 1 << 17;  // bytes of text per task
 
 std::uint32_t loadCount(std::string_view bytes) {
     std::uint32_t count = 0;
@@ -169,7 +168,7 @@ const char* nextFacet(const char* at, const char* end) {
 Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadReport& report) {
     std::vector<StlPart> parts;
     for (const char* begin = source.begin(); begin != source.end();) {
-        const std::size_t size = std::min(partBytes, std::size_t(source.end() - begin));
+        const std::size_t size = std::min(textPartBytes, std::size_t(source.end() - begin));
         const char* end = nextFacet(begin + size, source.end());
         parts.push_back({{{begin, end}}});
         begin = end;

@@ -10,6 +10,9 @@
 
 namespace bilayer::detail {
 
+/// Text that one task reads [bytes].
+inline constexpr std::size_t textPartBytes = 1 << 17;
+
 /// The text of a file. UTF-16 is decoded, and a leading byte order mark is skipped.
 class TextSource {
   public:

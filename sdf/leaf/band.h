@@ -18,9 +18,12 @@ inline bool any(const BlockMask& mask) {
     return bits != 0;
 }
 
+/// The voxels with the lowest z of their row, in a word of a mask.
+inline constexpr std::uint64_t lowestZ = 0x0101010101010101ull;
+
 /// Returns the mask dilated by the face neighbours inside the block.
 inline BlockMask grown(const BlockMask& mask) {
-    constexpr std::uint64_t lowestZ = 0x0101010101010101ull, highestZ = lowestZ << 7;  // in each row of a word
+    constexpr std::uint64_t highestZ = lowestZ << 7;
     BlockMask result;
     for (std::size_t x = 0; x < blockSide; ++x) {
         const std::uint64_t m = mask[x];

@@ -13,8 +13,6 @@
 namespace bilayer::detail {
 namespace {
 
-/// OpenVDB treats a transform with a determinant below 3e-15 as singular.
-constexpr float smallestVoxel = 2e-5f;
 /// Scale factor that the error for a small voxel size suggests, applied repeatedly: metres to millimetres.
 constexpr double unitStep = 1000;
 /// Minimum layer distance: rounding makes closer layers indistinguishable [voxels].
@@ -36,13 +34,13 @@ void checkWidth(const char* option, float voxels, float voxelSize) {
 }
 
 void checkVoxelSize(float voxelSize) {
-    if (voxelSize >= smallestVoxel) return;
+    if (voxelSize >= minVoxelSize) return;
     double scale = unitStep;
-    while (scale * double(voxelSize) < double(smallestVoxel)) scale *= unitStep;
+    while (scale * double(voxelSize) < double(minVoxelSize)) scale *= unitStep;
     throw std::invalid_argument(
         fmt::format("voxelSize {:g} is below {:g}, the smallest that OpenVDB takes: scale the mesh by {:g}{}, so that "
                     "voxels are {:g}",
-                    voxelSize, smallestVoxel, scale, scale == unitStep ? " (from metres to millimetres)" : "",
+                    voxelSize, minVoxelSize, scale, scale == unitStep ? " (from metres to millimetres)" : "",
                     scale * double(voxelSize)));
 }
 

@@ -19,9 +19,9 @@
 namespace bilayer::detail {
 namespace {
 
-/// Maximum brick count of the mesh's box: a cube of 40,000 voxels a side.
-constexpr int brickSide = 64;  // [voxels]
-constexpr double maxBricks = double(1u << 28);
+/// Maximum count of cubes of countedSide voxels a side in the mesh's box, which is then 40,000 voxels long.
+constexpr int countedSide = 64;
+constexpr double maxCubes = double(1u << 28);
 /// Approximate memory of a build per triangle (bins or hierarchy) and per block [bytes].
 constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
 
@@ -70,14 +70,14 @@ void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& o
         throw std::invalid_argument(fmt::format("voxelSize {:g} is too small for this mesh, {:g} voxels long: {}", h,
                                                 double(box.longestSide()) / h, why));
     };
-    double bricks = 1;
+    double cubes = 1;
     for (int axis = 0; axis < 3; ++axis) {
         const double low = double(box.lower[axis]) / h, high = double(box.upper[axis]) / h;
         if (!(std::abs(low) < farthestIndex && std::abs(high) < farthestIndex))
             refuse("index coordinates would leave 32 bits");
-        bricks *= (high - low + 2 * double(reach)) / brickSide + 2;
+        cubes *= (high - low + 2 * double(reach)) / countedSide + 2;
     }
-    if (bricks > maxBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
+    if (cubes > maxCubes) refuse("its box would have more than 2^28 cubes of 64^3 voxels");
     const double area = extent.area / (h * h);
     if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
     const double bytes = estimatedBytes(mesh, extent, options, reach);

@@ -20,7 +20,7 @@ struct Hole {
 /// Finds the widest hole with at least a minimum width. The minimum decides whether it is found, not its width. Parts
 /// that protrude from a solid and have no interior also count as a hole where winding numbers of one half surround
 /// them. The mesh must be valid and face outward (see orient()).
-/// @param least     minimum width [m], positive
+/// @param minimum   minimum width [m], positive
 /// @param progress  polled for cancellation, unless null
 Hole widestHole(const Mesh& mesh, double minimum, Progress* progress = nullptr);
 

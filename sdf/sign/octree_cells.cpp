@@ -10,13 +10,13 @@
 #include "sdf/base/morton.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
+#include "sdf/leaf/band.h"
 
 namespace bilayer::detail {
 namespace {
 
 /// Side of the largest node of an OpenVDB tree [voxels]. Cells aligned to it become the fewest tiles.
 constexpr std::int64_t nodeVoxels = 4096;
-constexpr std::uint64_t lowestZ = 0x0101010101010101ull;  // the voxels with z = 0 in a slice
 
 using Offset = std::array<std::uint32_t, 3>;
 

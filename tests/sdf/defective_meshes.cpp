@@ -213,6 +213,15 @@ TEST_CASE("A mesh inside out is flipped at any position") {
     }
 }
 
+TEST_CASE("The double layer method tells where faces lie back to back") {
+    Mesh mesh = shapes::sphere(1, 3);
+    const auto reason = [&] { return build(mesh, {.voxelSize = 0.1f, .method = Method::doubleLayer}).signReason(); };
+    CHECK_THAT(reason(), !Catch::Contains("unknown"));
+    const std::vector<glm::uvec3> front = mesh.triangles;
+    for (const glm::uvec3& t : front) mesh.triangles.push_back({t.x, t.z, t.y});
+    CHECK_THAT(reason(), Catch::Contains("both are equally near: their side is unknown"));
+}
+
 TEST_CASE("Of two components, only the one inside out is flipped") {
     const Mesh ball = shapes::sphere(1, 3);
     for (const glm::vec3 axis : {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)})

@@ -146,7 +146,7 @@ TEST_CASE("an inspection can be cancelled in each of its searches") {
         const Topology topology = Topology::ofWelded(*mesh);
         const TriangleTree tree(*mesh);
         checkCancelling("intersections", 5, [&](Progress* p) { countIntersectingPairs(*mesh, topology, tree, p); });
-        checkCancelling("walls", 5, [&](Progress* p) { wallThickness(tree, p); });
+        checkCancelling("walls", 5, [&](Progress* p) { wallThickness(tree, {}, p); });
         std::vector<float> told;
         inspect(*mesh, 0, [&](float fraction) { return told.push_back(fraction), true; });
         CHECK(std::is_sorted(told.begin(), told.end()));

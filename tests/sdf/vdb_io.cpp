@@ -53,6 +53,28 @@ TEST_CASE("a field survives its file") {
         REQUIRE(values.getValue(value.getCoord()) == value.getValue());
 }
 
+TEST_CASE("A field keeps its voxels and its origin far from zero, or is not written") {
+    const auto path = test::scratch("far.vdb");
+    for (double distance = 1e3; distance <= 1e16; distance *= 10) {
+        Mesh mesh = shapes::box({0.8f, 0.5f, 0.3f}, 1);
+        mesh.origin = {distance, -distance / 3, 0.7 * distance};
+        const LevelSet field = build(mesh, {.voxelSize = 0.04f});
+        std::filesystem::remove(path);
+        CAPTURE(distance);
+        if (distance > 1e9) {
+            CHECK_THROWS_WITH(writeVdb(path, field),
+                              Catch::Contains("voxels from zero") && Catch::Contains("larger voxels"));
+            CHECK_FALSE(std::filesystem::exists(path));
+            continue;
+        }
+        writeVdb(path, field);
+        const LevelSet back = readVdb(path);
+        CHECK(back.voxelSize() == Approx(field.voxelSize()).epsilon(1e-5));
+        CHECK(back.origin() == mesh.origin);
+        CHECK(back.activeVoxels() == field.activeVoxels());
+    }
+}
+
 TEST_CASE("half floats halve the file and keep three digits") {
     const LevelSet field = torus();
     writeVdb(test::scratch("full.vdb"), field);

@@ -38,7 +38,7 @@ TEST_CASE("build reports what the file then holds") {
     CHECK(json["errorBound"].get<double>() == Approx(1e-4 * 0.05));
     for (const char* part : {"read", "build", "write"}) CHECK(json["seconds"][part].get<double>() >= 0);
     CHECK(json["seconds"]["parts"].is_object());
-    CHECK(json["mesh"]["closedAndOriented"] == true);
+    CHECK(json["mesh"]["balanced"] == true);
     CHECK(json["mesh"]["points"] == 642);
     CHECK(json["file"]["vertices"] == 642);
     CHECK(json["file"]["notes"].empty());
@@ -61,13 +61,13 @@ TEST_CASE("build inspects a mesh only where a report is asked for") {
         return r;
     };
     const auto glance = with({"--json"}).json()["mesh"];
-    CHECK(glance["closedAndOriented"] == false);
+    CHECK(glance["balanced"] == false);
     CHECK(glance["triangles"] == 319);
     CHECK_FALSE(glance.contains("boundaryEdges"));
     const auto report = with({"--json", "--report"}).json()["mesh"];
     CHECK(report["boundaryEdges"] == 3);
     CHECK(report["wall"] == 0.1);
-    CHECK_THAT(with({}).out, Catch::Contains("closed") && !Catch::Contains("thin walls"));
+    CHECK_THAT(with({}).out, Catch::Contains("not balanced") && !Catch::Contains("thin walls"));
     CHECK_THAT(with({"--report"}).out, Catch::Contains("thin walls"));
 }
 

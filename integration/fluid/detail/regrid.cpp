@@ -38,12 +38,11 @@ using Leaf = FloatTree::LeafNodeType;
 
 constexpr const char* byFlood = "flood";  // LevelSet::sign() of a mesh whose winding numbers are of no use
 
-constexpr float minFieldWidth = 1;    // [field voxels] on either side; a narrower band does not define the surface
-constexpr float rounding = 1e-5f;     // tolerance of a width that is a whole number of voxels
-constexpr double maxIndex = 1 << 29;  // keeps OpenVDB's 32-bit coordinates and sums of two of them in range
-constexpr double sameVoxels = 1e-6;   // relative tolerance of equal voxel sizes
-constexpr double maxHoleWidth = 2;    // [voxels]; wider holes are not closed
-constexpr double spareWidth = 1e-3;   // relative: what other voxels may change in the width of a hole by rounding
+constexpr float minFieldWidth = 1;   // [field voxels] on either side; a narrower band does not define the surface
+constexpr float rounding = 1e-5f;    // tolerance of a width that is a whole number of voxels
+constexpr double sameVoxels = 1e-6;  // relative tolerance of equal voxel sizes
+constexpr double maxHoleWidth = 2;   // [voxels]; wider holes are not closed
+constexpr double spareWidth = 1e-3;  // relative: what other voxels may change in the width of a hole by rounding
 
 // A mesh in voxels near the origin, where floats are most precise, and its translation by whole leaves.
 struct Placed {
