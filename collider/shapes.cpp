@@ -8,7 +8,6 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "collider/contact/hull.h"
 #include "collider/contact/shape_data.h"
@@ -82,16 +81,14 @@ ContactShape ContactShape::hull(std::span<const glm::vec3> points, float radius)
 }
 
 ContactShape ContactShape::spheres(std::span<const SphereOfHull> spheres) {
-    std::vector<MultisphereHull::Sphere> all;
     float largest = 0;
     for (const SphereOfHull& sphere : spheres) {
         requireNotNegative(sphere.radius, "radius of a sphere");
         if (!isFinite(sphere.centre)) throw std::invalid_argument("the centre of a sphere is not finite");
-        all.push_back({sphere.centre, sphere.radius});
         largest = std::max(largest, sphere.radius);
     }
     requirePositive(largest, "largest radius");
-    return ContactShape(dataOf(Convex::spheres(std::move(all))));
+    return ContactShape(dataOf(Convex::spheres({spheres.begin(), spheres.end()})));
 }
 
 ContactShape ContactShape::plane(const glm::vec3& normal, float offset) {

@@ -37,7 +37,7 @@ TEST_CASE("The distance from a multisphere is that of its support function, outs
     std::uniform_real_distribution<float> part(-1, 1);
     const auto vector = [&] { return glm::vec3(part(random), part(random), part(random)); };
     for (int run = 0; run < 60; ++run) {
-        std::vector<MultisphereHull::Sphere> balls;
+        std::vector<SphereOfHull> balls;
         for (int i = 0; i <= run % 6; ++i) balls.push_back({0.5f * vector(), 0.02f + 0.2f * std::abs(part(random))});
         if (run % 3 == 0)
             for (auto& ball : balls) ball.radius = 0.2f;

@@ -111,7 +111,7 @@ Convex cylinderOf(const btCylinderShape& shape) {
 
 Convex spheresOf(const btMultiSphereShape& shape) {
     const btVector3& scaling = shape.getLocalScaling();
-    std::vector<MultisphereHull::Sphere> spheres;
+    std::vector<SphereOfHull> spheres;
     for (int i = 0; i < shape.getSphereCount(); ++i)
         spheres.push_back({toGlm(scaling * shape.getSpherePosition(i)), scaling.x() * shape.getSphereRadius(i)});
     return Convex::spheres(std::move(spheres));
