@@ -8,7 +8,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <optional>
 #include <variant>
 #include <vector>
 
@@ -24,18 +23,18 @@ using namespace detail;
 
 namespace {
 
-/// A shape A and a collider B.
+/// A shape A and a collider B, where they are: motions are left out.
 struct ShapeAndCollider {
-    const PlacedShape& a;
+    PlacedShape a, shapeOfB;
     Placed b;
-    Similarity aToWorld, bToWorld, aToB;
+    Similarity bToWorld, aToB;
 
-    ShapeAndCollider(const PlacedShape& a, const Placed& b)
-        : a(a),
-          b(b),
-          aToWorld(toWorld(a.pose, a.scale)),
+    ShapeAndCollider(const PlacedShape& a, const PlacedShape& b)
+        : a{a.shape, a.pose, a.scale},
+          shapeOfB{b.shape, b.pose, b.scale},
+          b(placed(shapeOfB)),
           bToWorld(toWorld(b.pose, b.scale)),
-          aToB(aToWorld.into(bToWorld)) {}
+          aToB(toWorld(a.pose, a.scale).into(bToWorld)) {}
 
     const MeshTree& mesh() const { return b.collider.data().meshTree(); }
 };
@@ -60,7 +59,7 @@ void take(BodyDistance& deepest, const BodyDistance& other) {
 /// The deepest contact of collide(); nothing found if there is none.
 BodyDistance deepestContact(const ShapeAndCollider& bodies) {
     std::vector<Contact> contacts;
-    collide(bodies.a, {ContactShape(bodies.b.collider), bodies.b.pose, bodies.b.scale}, {.exact = true}, contacts);
+    collide(bodies.a, bodies.shapeOfB, {.exact = true}, contacts);
     BodyDistance deepest;
     for (const Contact& contact : contacts)
         take(deepest, {.found = true,
@@ -208,7 +207,7 @@ BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const Distance
                       DistanceStart* start) {
     const Order order = orderOf(a, b);
     if (order.both) return distance(placed(a), placed(b), options, start);
-    const ShapeAndCollider bodies(order.isSwapped ? b : a, placed(order.isSwapped ? a : b));
+    const ShapeAndCollider bodies(order.isSwapped ? b : a, order.isSwapped ? a : b);
     const double limit = std::max(double(options.maxDistance), 0.0) / double(bodies.b.scale);
     DistanceStart own;
     if (start) own.triangleB = order.isSwapped ? start->triangleA : start->triangleB;
