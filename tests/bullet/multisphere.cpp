@@ -14,7 +14,7 @@
 #include "collider/contact/narrow_phase.h"
 #include "demos/shared/exact_distance.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/convex_shape.h"
+#include "integration/bullet/detail/contact_shapes.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
 #include "world.h"

@@ -3,6 +3,7 @@
 
 #include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <LinearMath/btAabbUtil2.h>
 #include <tbb/parallel_for_each.h>
 
@@ -15,8 +16,11 @@
 #include <utility>
 #include <vector>
 
+#include <bilayer/integration/bullet/shape.h>
+#include "collider/contact/penetration.h"
+#include "integration/bullet/detail/body_sweep.h"
+#include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/time_of_impact.h"
 
 namespace bilayer::bullet::detail {
 
@@ -30,13 +34,52 @@ constexpr int maxRounds = 256;
 // A body stopped this early in a step counts as not moved.
 constexpr float atStart = 1e-3f;
 
+/// A shape other than a compound, and its pose in its object.
+struct LeafShape {
+    const btCollisionShape* shape;
+    btTransform local;
+
+    const Shape* field() const {
+        return shape->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE ? static_cast<const Shape*>(shape) : nullptr;
+    }
+    /// Whether it takes part in continuous collision.
+    bool isStopped() const {
+        return shape->getShapeType() != GIMPACT_SHAPE_PROXYTYPE && (!field() || field()->speculative());
+    }
+};
+
+/// @param found  callback (const LeafShape&)
+template <class Found>
+void visitLeafShapes(const btCollisionShape* shape, const btTransform& local, Found&& found) {
+    if (!shape->isCompound()) return found(LeafShape{shape, local});
+    const auto* compound = static_cast<const btCompoundShape*>(shape);
+    for (int i = 0; i < compound->getNumChildShapes(); ++i)
+        visitLeafShapes(compound->getChildShape(i), local * compound->getChildTransform(i), found);
+}
+
+/// The shapes of an object that take part.
+std::vector<LeafShape> leafShapes(const btCollisionObject& object) {
+    std::vector<LeafShape> leaves;
+    visitLeafShapes(object.getCollisionShape(), btTransform::getIdentity(), [&](const LeafShape& leaf) {
+        if (leaf.isStopped()) leaves.push_back(leaf);
+    });
+    return leaves;
+}
+
+/// @param shape  contactShapeOf(leaf)
+SweptShape swept(const LeafShape& leaf, const ContactShape& shape, const Sweep& sweep) {
+    if (!leaf.field()) return {shape, sweep, toPose(leaf.local)};
+    const Placed placed = leaf.field()->placed(leaf.local);
+    return {shape, sweep, placed.pose, placed.scale};
+}
+
 /// Two bodies that may meet in a step; one of them is fast.
 struct SweptPair {
     BodySweep *a, *b;
-    float margin;     ///< two bodies that are not stopped may move by up to this; contacts handle that [m]
-    Impact impact{};  ///< the first impact; normal from b to a
+    float margin;          ///< two bodies that are not stopped may move by up to this; contacts handle that [m]
+    Penetration impact{};  ///< the first one
     float checkedA = -1, checkedB = -1;  ///< the ends of their sweeps when they were last checked
-    Impact stop{};                       ///< where one of them was stopped
+    Penetration stop{};                  ///< where one of them was stopped
 
     /// Whether the pair has not been checked since one of the two was stopped.
     bool needsCheck() const { return a->stopTime() != checkedA || b->stopTime() != checkedB; }
@@ -45,17 +88,18 @@ struct SweptPair {
         impact = {};
         checkedA = a->stopTime(), checkedB = b->stopTime();
         if (std::min(checkedA, checkedB) >= 1 && a->maxDisplacement(*b) <= margin) return;
-        visitLeafShapes(a->object(), [&](const LeafShape& one) {
-            visitLeafShapes(b->object(), [&](const LeafShape& two) {
-                if (one.field()) impact = earlier(impact, timeOfImpact(one, *a, two, *b));
-                if (two.field()) impact = earlier(impact, timeOfImpact(two, *b, one, *a).reversed());
-            });
-        });
+        for (const LeafShape& one : leafShapes(a->object())) {
+            const ContactShape shape = contactShapeOf(*one.shape);
+            for (const LeafShape& two : leafShapes(b->object()))
+                if (one.field() || two.field())
+                    impact = earlier(impact, firstPenetration(swept(one, shape, a->sweep()),
+                                                              swept(two, contactShapeOf(*two.shape), b->sweep())));
+        }
     }
 
     /// Stops the body that moves farther. If it is stopped already, stops both, since the other one moves on into it.
     bool stopBody() {
-        if (impact.time >= 1 || needsCheck()) return false;
+        if (!impact.found() || needsCheck()) return false;
         BodySweep *faster = a, *slower = b;
         if (a->maxDisplacement() < b->maxDisplacement()) std::swap(faster, slower);
         const bool wasStopped = faster->stopTime() < 1, isStopped = faster->stopAt(impact.time);
@@ -65,7 +109,7 @@ struct SweptPair {
         return true;
     }
 
-    bool isStopped() const { return stop.time < 1; }
+    bool isStopped() const { return stop.found(); }
     bool hasNotMoved() const { return stop.time <= atStart; }
     StoppedPair stopped() const {
         const auto [first, second] = std::minmax(&a->object(), &b->object());
@@ -83,7 +127,7 @@ struct SweptPair {
 
     /// Removes the approach velocity of the two, as an impact without restitution and friction does.
     void removeApproachVelocity() const {
-        const btVector3 place = toBullet(stop.place), normal = toBullet(stop.normal);
+        const btVector3 place = toBullet(stop.position), normal = toBullet(stop.normal);
         float speed = 0, perMass = 0;
         for (const auto& [sweep, sign] : {std::pair(a, 1.f), std::pair(b, -1.f)})
             if (const btRigidBody* body = sweep->body()) {
@@ -101,9 +145,8 @@ struct SweptPair {
 /// Maximum separation of contacts with an object; nothing without a field.
 std::optional<float> marginOf(const btCollisionObject& object) {
     std::optional<float> margin;
-    visitLeafShapes(object, [&](const LeafShape& shape) {
-        if (const Shape* field = shape.field()) margin = std::max(margin.value_or(0), float(field->getMargin()));
-    });
+    for (const LeafShape& leaf : leafShapes(object))
+        if (const Shape* field = leaf.field()) margin = std::max(margin.value_or(0), float(field->getMargin()));
     return margin;
 }
 
@@ -132,7 +175,7 @@ class SweptPairs {
             // earliest first: a stopped body may come no farther
             std::vector<SweptPair*> order;
             for (SweptPair& pair : pairs_)
-                if (pair.impact.time < 1) order.push_back(&pair);
+                if (pair.impact.found()) order.push_back(&pair);
             std::stable_sort(order.begin(), order.end(),
                              [](auto* one, auto* two) { return one->impact.time < two->impact.time; });
             bool isAnyStopped = false;
