@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // When a moving body first penetrates another one.
-// Tested by tests/bullet/continuous_collision.cpp through WorldExtensions, and by tests/collider/time_of_impact.cpp.
+// Tested by tests/collider/time_of_impact.cpp through timeOfImpact().
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -7,7 +7,7 @@
 // - bool isNear(from, to, radius): whether a sphere may come near on a straight path.
 //
 // Only fields are entered by spheres with a radius, and by points where they are at the start.
-// Tested by tests/bullet/continuous_collision.cpp through firstPenetration().
+// Tested by tests/collider/time_of_impact.cpp through timeOfImpact().
 #pragma once
 
 #include <glm/vec3.hpp>
