@@ -10,8 +10,8 @@
 #include <bilayer/integration/bullet/shape.h>
 #include "collider/contact/edge_probes.h"
 #include "collider/contact/narrow_phase.h"
+#include "collider/contact/predicted_contacts.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/predicted_contacts.h"
 #include "integration/bullet/detail/velocity.h"
 
 namespace bilayer::bullet::detail {
@@ -42,6 +42,13 @@ Continuity continuityOf(const Side& a, const Side& b) {
     return {.sameWithin = std::min(sameWithin(*a.shape), sameWithin(*b.shape)),
             .restingFriction = std::max(restingFriction(*a.shape), restingFriction(*b.shape)),
             .isSpeculative = isSpeculative(a) && isSpeculative(b)};
+}
+
+SteppedBody steppedBody(const Side& side) {
+    const Velocity velocity = velocityOf(*side.object);
+    SteppedBody body{toGlm(velocity.centre), toGlm(velocity.linear), toGlm(velocity.angular), side.seconds, {}};
+    if (isField(*side.shape)) body.field.emplace(static_cast<const Shape&>(*side.shape).placed(side.transform));
+    return body;
 }
 
 }  // namespace
@@ -132,7 +139,8 @@ void Pair::finish(const Side& a, const Side& b) {
     reduction_.update(contacts_, toPose(a.transform), toPose(b.transform));
     continuity_ = continuityOf(a, b);
     details_.clear();
-    const PredictedContacts predictions(a, b, continuity_);
+    const SteppedBody bodyA = steppedBody(a), bodyB = steppedBody(b);
+    const PredictedContacts predictions(bodyA, bodyB, continuity_.sameWithin, continuity_.isSpeculative);
     for (const ContactPatch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i)
             details_.push_back({predictions.predict(patch.contacts[i]), std::nullopt});
