@@ -6,13 +6,13 @@
 #include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
 #include <limits>
 #include <optional>
 #include <type_traits>
 #include <variant>
 #include <vector>
 
+#include "collider/contact/body_transform.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/edge_probes.h"
 #include "collider/contact/open_surface.h"
@@ -39,12 +39,8 @@ constexpr int maxProbes = 1 << 20;     // along an edge; distant ones are skippe
 constexpr float arcOverChord = 1.12f;  // length of an arc of a rim over its chord, up to a quarter of the rim
 
 /// Transforms coordinates of the points' shape into those of the surface at some time of the step.
-struct StepTransform {
+struct StepTransform : BodyTransform {
     float time;
-    glm::mat3 linear;
-    glm::vec3 shift;
-
-    glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
 };
 
 /// Moments from start to end, so close together that the paths between them are straight.
@@ -56,9 +52,8 @@ std::vector<StepTransform> stepTransforms(const SweptShape& points, const SweptS
     times.erase(std::unique(times.begin(), times.end()), times.end());
     std::vector<StepTransform> transforms;
     for (const float time : times) {
-        const Pose pose = relative(surface.at(double(time)), points.at(double(time)));
-        transforms.push_back(
-            {time, points.scale / surface.scale * glm::mat3_cast(pose.rotation), pose.position / surface.scale});
+        const Pose from = points.at(double(time)), into = surface.at(double(time));
+        transforms.push_back({BodyTransform(from, points.scale, into, surface.scale), time});
     }
     return transforms;
 }
@@ -76,10 +71,7 @@ class PointSweep {
   public:
     /// @param voxel  in the surface's units
     PointSweep(const Surface& surface, const std::vector<StepTransform>& transforms, float voxel)
-        : surface_(surface),
-          transforms_(transforms),
-          voxel_(voxel),
-          scale_(glm::length(transforms.front().linear[0])) {}
+        : surface_(surface), transforms_(transforms), voxel_(voxel), scale_(transforms.front().scale) {}
 
     /// Follows the surface points of a collider.
     void follow(const SurfacePoints& points) {
@@ -138,7 +130,7 @@ class PointSweep {
                 const float before = depth(from), after = depth(to), deepest = allowedDepth * voxel_;
                 if (after > deepest) {
                     // back to the contact of its own surface
-                    const glm::vec3 out = transforms_[i].linear * outward / scale_;
+                    const glm::vec3 out = transforms_[i].rotated(outward);
                     const float touching = std::min(inward * glm::dot(out, entered->normal), 0.f);
                     const float descent = after - before, back = maxReturn * voxel_ / glm::distance(from, to);
                     const float part = std::max(touching - before, -before - back * descent) / descent;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "collider/contact/body_distance.h"
+#include "collider/contact/body_transform.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/placed_shapes.h"
 #include "collider/contact/shape_data.h"
@@ -160,27 +161,17 @@ BodyDistance distanceOf(const HalfSpace& solid, const ShapeAndCollider& bodies, 
     return answer;
 }
 
-/// The box around the mesh of B in coordinates of the sheet A, grown by a distance there.
-Bounds boxAround(const ShapeAndCollider& bodies, float reach) {
-    const Bounds& own = bodies.b.collider.bounds();
-    const Similarity bToA = bodies.aToB.inverted();
-    Bounds box;
-    for (int corner = 0; corner < 8; ++corner)
-        box.add(
-            glm::vec3(bToA(glm::dvec3(corner & 1 ? own.lower.x : own.upper.x, corner & 2 ? own.lower.y : own.upper.y,
-                                      corner & 4 ? own.lower.z : own.upper.z))));
-    return {box.lower - reach, box.upper + reach};
-}
-
 /// Asks for triangles in boxes that grow until the nearest one must be among them.
 BodyDistance distanceOf(const TriangleSheet& sheet, const ShapeAndCollider& bodies, double limit,
                         DistanceStart& start) {
     constexpr float maxReach = 1e30f;
     const double scale = bodies.aToB.scale;
+    const BodyTransform intoSheet(bodies.b.pose, bodies.b.scale, bodies.a.pose, bodies.a.scale);
     SolidDistance best;
     best.distance = limit;
     const auto search = [&](float reach) {
-        sheet.visit(boxAround(bodies, reach), [&](const Triangle& triangle, std::uint64_t) {
+        sheet.visit(intoSheet.boxAround(bodies.b.collider.bounds(), reach), [&](const Triangle& triangle,
+                                                                                std::uint64_t) {
             if (!(best.distance > 0)) return;
             const SolidDistance found = nearestTo(triangle, bodies.mesh(), bodies.aToB, best.distance, start.triangleB);
             if (found.found() && found.distance < best.distance) best = found;
