@@ -42,35 +42,35 @@ struct LeafShape {
     const Shape* field() const {
         return shape->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE ? static_cast<const Shape*>(shape) : nullptr;
     }
-    /// Whether it takes part in continuous collision.
-    bool isStopped() const {
-        return shape->getShapeType() != GIMPACT_SHAPE_PROXYTYPE && (!field() || field()->speculative());
+    /// Whether it takes part in continuous collision. Soft bodies are neither convex nor concave.
+    bool takesPart() const {
+        return shape->getShapeType() != GIMPACT_SHAPE_PROXYTYPE && (shape->isConvex() || shape->isConcave()) &&
+               (!field() || field()->speculative());
+    }
+    /// @param contactShape  contactShapeOf() this shape
+    SweptShape swept(const ContactShape& contactShape, const Sweep& sweep) const {
+        if (!field()) return {contactShape, sweep, toPose(local)};
+        const Placed placed = field()->placed(local);
+        return {contactShape, sweep, placed.pose, placed.scale};
     }
 };
 
+/// Visits the shapes that take part.
 /// @param found  callback (const LeafShape&)
 template <class Found>
 void visitLeafShapes(const btCollisionShape* shape, const btTransform& local, Found&& found) {
-    if (!shape->isCompound()) return found(LeafShape{shape, local});
+    if (!shape->isCompound()) {
+        if (const LeafShape leaf{shape, local}; leaf.takesPart()) found(leaf);
+        return;
+    }
     const auto* compound = static_cast<const btCompoundShape*>(shape);
     for (int i = 0; i < compound->getNumChildShapes(); ++i)
         visitLeafShapes(compound->getChildShape(i), local * compound->getChildTransform(i), found);
 }
 
-/// The shapes of an object that take part.
-std::vector<LeafShape> leafShapes(const btCollisionObject& object) {
-    std::vector<LeafShape> leaves;
-    visitLeafShapes(object.getCollisionShape(), btTransform::getIdentity(), [&](const LeafShape& leaf) {
-        if (leaf.isStopped()) leaves.push_back(leaf);
-    });
-    return leaves;
-}
-
-/// @param shape  contactShapeOf(leaf)
-SweptShape swept(const LeafShape& leaf, const ContactShape& shape, const Sweep& sweep) {
-    if (!leaf.field()) return {shape, sweep, toPose(leaf.local)};
-    const Placed placed = leaf.field()->placed(leaf.local);
-    return {shape, sweep, placed.pose, placed.scale};
+template <class Found>
+void visitLeafShapes(const btCollisionObject& object, Found&& found) {
+    visitLeafShapes(object.getCollisionShape(), btTransform::getIdentity(), found);
 }
 
 /// Two bodies that may meet in a step; one of them is fast.
@@ -88,13 +88,14 @@ struct SweptPair {
         impact = {};
         checkedA = a->stopTime(), checkedB = b->stopTime();
         if (std::min(checkedA, checkedB) >= 1 && a->maxDisplacement(*b) <= margin) return;
-        for (const LeafShape& one : leafShapes(a->object())) {
-            const ContactShape shape = contactShapeOf(*one.shape);
-            for (const LeafShape& two : leafShapes(b->object()))
-                if (one.field() || two.field())
-                    impact = earlier(impact, firstPenetration(swept(one, shape, a->sweep()),
-                                                              swept(two, contactShapeOf(*two.shape), b->sweep())));
-        }
+        visitLeafShapes(a->object(), [&](const LeafShape& one) {
+            const ContactShape ofOne = contactShapeOf(*one.shape);
+            visitLeafShapes(b->object(), [&](const LeafShape& two) {
+                if (!one.field() && !two.field()) return;
+                const ContactShape ofTwo = contactShapeOf(*two.shape);
+                impact = earlier(impact, firstPenetration(one.swept(ofOne, a->sweep()), two.swept(ofTwo, b->sweep())));
+            });
+        });
     }
 
     /// Stops the body that moves farther. If it is stopped already, stops both, since the other one moves on into it.
@@ -145,8 +146,9 @@ struct SweptPair {
 /// Maximum separation of contacts with an object; nothing without a field.
 std::optional<float> marginOf(const btCollisionObject& object) {
     std::optional<float> margin;
-    for (const LeafShape& leaf : leafShapes(object))
+    visitLeafShapes(object, [&](const LeafShape& leaf) {
         if (const Shape* field = leaf.field()) margin = std::max(margin.value_or(0), float(field->getMargin()));
+    });
     return margin;
 }
 
