@@ -81,6 +81,9 @@ struct ImpactOptions {
     /// Bodies touch at this separation [m]. At least 1e-5 of the size of the larger body counts. By default it is a
     /// twentieth of the smaller voxel.
     float tolerance = 0;
+    /// Finds the first penetration instead of the first touch. Bodies may start in contact, and rest, slide and roll on
+    /// each other; what they do deeper than contacts handle is found. The tolerance has no effect.
+    bool penetration = false;
 };
 
 /// The answer of timeOfImpact().
@@ -89,7 +92,7 @@ struct Impact {
     float fraction = 1;     ///< of the motion until they touch, in [0, 1]
     Pose poseA;             ///< of A then
     Pose poseB;             ///< of B then
-    BodyDistance distance;  ///< of the bodies then: where they touch
+    BodyDistance distance;  ///< of the bodies then: where they touch; of a penetration only its place and normal
 };
 
 /// When two bodies touch that move from their poses by their motions. Both motions take the same time; positions change
@@ -103,10 +106,15 @@ struct Impact {
 /// approaches faster than the bodies' velocities and the rotations at their radii allow. Takes a distance() for each
 /// step, most of which shorten the separation by a constant factor. Throws std::invalid_argument for motions that are
 /// not finite, or rotate by more than 1000 rad.
+///
+/// With ImpactOptions::penetration, points of either body are followed along their paths through the other one: the
+/// surface points of a collider, the vertices and edges of other shapes. A point penetrates where it gets more than a
+/// third of the smaller voxel into the other body, or deeper than it starts. The bodies are then at most half a voxel
+/// before the place where it enters. No triangles are needed; what passes between surface points is not seen.
 Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options = {});
 
 /// The same for two shapes, at least one of them a collider. Throws std::invalid_argument also if neither is, and for a
-/// plane or a sheet of triangles that rotates: its far points would have no finite speed.
+/// plane or a sheet of triangles that rotates and may be touched: its far points would have no finite speed.
 Impact timeOfImpact(const PlacedShape& a, const PlacedShape& b, const ImpactOptions& options = {});
 
 }  // namespace bilayer

@@ -8,7 +8,6 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "collider/contact/hull.h"
 #include "collider/contact/shape_data.h"
@@ -30,19 +29,14 @@ void requireNotNegative(float length, const char* name) {
         throw std::invalid_argument(fmt::format("the {} is {}, and must be 0 or more and finite", name, length));
 }
 
-std::shared_ptr<const ContactShapeData> dataOf(Convex convex) {
-    return std::make_shared<const ContactShapeData>(ContactShapeData{std::move(convex)});
-}
-
 /// The coordinate of the axis of solids of revolution.
 constexpr int upAxis = 1;
 
 }  // namespace
 
-ContactShape::ContactShape(Collider collider)
-    : data_(std::make_shared<const ContactShapeData>(ContactShapeData{std::move(collider)})) {}
+ContactShape::ContactShape(Collider collider) : ContactShape(ContactShapeData{std::move(collider)}) {}
 
-ContactShape::ContactShape(std::shared_ptr<const ContactShapeData> data) : data_(std::move(data)) {}
+ContactShape::ContactShape(ContactShapeData data) : data_(std::make_shared<const ContactShapeData>(std::move(data))) {}
 
 const Collider* ContactShape::collider() const {
     return std::get_if<Collider>(&data_->shape);
@@ -50,60 +44,58 @@ const Collider* ContactShape::collider() const {
 
 ContactShape ContactShape::sphere(float radius) {
     requirePositive(radius, "radius");
-    return ContactShape(dataOf(Convex::segment(upAxis, 0, radius)));
+    return ContactShape(ContactShapeData{Convex::segment(upAxis, 0, radius)});
 }
 
 ContactShape ContactShape::box(const glm::vec3& halfExtents) {
     for (int axis = 0; axis < 3; ++axis) requirePositive(halfExtents[axis], "half extent");
-    return ContactShape(dataOf(Convex::box(halfExtents)));
+    return ContactShape(ContactShapeData{Convex::box(halfExtents)});
 }
 
 ContactShape ContactShape::capsule(float radius, float halfHeight) {
     requirePositive(radius, "radius");
     requireNotNegative(halfHeight, "half height");
-    return ContactShape(dataOf(Convex::segment(upAxis, halfHeight, radius)));
+    return ContactShape(ContactShapeData{Convex::segment(upAxis, halfHeight, radius)});
 }
 
 ContactShape ContactShape::cylinder(float radius, float halfHeight) {
     requirePositive(radius, "radius");
     requirePositive(halfHeight, "half height");
-    return ContactShape(dataOf(Convex::revolution(upAxis, halfHeight, radius, radius, 0)));
+    return ContactShape(ContactShapeData{Convex::revolution(upAxis, halfHeight, radius, radius, 0)});
 }
 
 ContactShape ContactShape::cone(float radius, float halfHeight) {
     requirePositive(radius, "radius");
     requirePositive(halfHeight, "half height");
-    return ContactShape(dataOf(Convex::revolution(upAxis, halfHeight, radius, 0, 0)));
+    return ContactShape(ContactShapeData{Convex::revolution(upAxis, halfHeight, radius, 0, 0)});
 }
 
 ContactShape ContactShape::hull(std::span<const glm::vec3> points, float radius) {
     requireNotNegative(radius, "radius");
-    return ContactShape(dataOf(Convex::hull(convexHullOf(points), radius)));
+    return ContactShape(ContactShapeData{Convex::hull(convexHullOf(points), radius)});
 }
 
 ContactShape ContactShape::spheres(std::span<const SphereOfHull> spheres) {
-    std::vector<MultisphereHull::Sphere> all;
     float largest = 0;
     for (const SphereOfHull& sphere : spheres) {
         requireNotNegative(sphere.radius, "radius of a sphere");
         if (!isFinite(sphere.centre)) throw std::invalid_argument("the centre of a sphere is not finite");
-        all.push_back({sphere.centre, sphere.radius});
         largest = std::max(largest, sphere.radius);
     }
     requirePositive(largest, "largest radius");
-    return ContactShape(dataOf(Convex::spheres(std::move(all))));
+    return ContactShape(ContactShapeData{Convex::spheres({spheres.begin(), spheres.end()})});
 }
 
 ContactShape ContactShape::plane(const glm::vec3& normal, float offset) {
     const float length = glm::length(normal);
     requirePositive(length, "length of the normal");
     if (!std::isfinite(offset)) throw std::invalid_argument("the offset of the plane is not finite");
-    return ContactShape(std::make_shared<const ContactShapeData>(ContactShapeData{HalfSpace{normal / length, offset}}));
+    return ContactShape(ContactShapeData{HalfSpace{normal / length, offset}});
 }
 
 ContactShape ContactShape::triangles(TriangleSheet sheet) {
     if (!sheet.visit) throw std::invalid_argument("the sheet of triangles has no function 'visit'");
-    return ContactShape(std::make_shared<const ContactShapeData>(ContactShapeData{std::move(sheet)}));
+    return ContactShape(ContactShapeData{std::move(sheet)});
 }
 
 }  // namespace bilayer

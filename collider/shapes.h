@@ -72,12 +72,12 @@ class ContactShape {
     /// The collider, if the shape was made of one; null otherwise.
     const Collider* collider() const;
 
-    /// For internal use.
+    /// For internal use; the functions above make shapes.
+    explicit ContactShape(detail::ContactShapeData data);
+    /// The data; for internal use.
     const detail::ContactShapeData& data() const { return *data_; }
 
   private:
-    explicit ContactShape(std::shared_ptr<const detail::ContactShapeData> data);
-
     std::shared_ptr<const detail::ContactShapeData> data_;
 };
 

@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <stdexcept>
 #include <variant>
 
+#include "collider/contact/advancement.h"
+#include "collider/contact/body_transform.h"
+#include "collider/contact/penetration.h"
+#include "collider/contact/placed_shapes.h"
 #include "collider/contact/shape_data.h"
 #include "sdf/base/finite.h"
 
@@ -30,16 +33,6 @@ void check(const Motion& motion) {
         throw std::invalid_argument("the motion rotates by more than 1000 rad");
 }
 
-/// The body after a fraction of its motion.
-PlacedShape after(const PlacedShape& body, double fraction) {
-    const glm::dvec3 turned = fraction * glm::dvec3(body.motion.rotation);
-    const double angle = glm::length(turned);
-    glm::dquat rotation(body.pose.rotation);
-    if (angle > 0) rotation = glm::angleAxis(angle, turned / angle) * rotation;
-    const glm::dvec3 position = glm::dvec3(body.pose.position) + fraction * glm::dvec3(body.motion.displacement);
-    return {body.shape, {glm::vec3(position), glm::quat(glm::normalize(rotation))}, body.scale};
-}
-
 /// What the search must know of a body.
 struct Extent {
     double radius = 0;  ///< the largest distance of a point from the pose position [m]
@@ -47,10 +40,11 @@ struct Extent {
     double voxel = std::numeric_limits<double>::infinity();  ///< of the field, if it has one [m]
 };
 
-Extent extentOf(const Collider& collider, double scale) {
-    const Bounds& bounds = collider.bounds();
-    return {scale * glm::length(glm::dvec3(glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper)))),
-            scale * double(bounds.longestSide()), scale * double(collider.field().voxelSize())};
+Extent extentOf(const Placed& body) {
+    const Bounds& bounds = body.collider.bounds();
+    const auto scale = double(body.scale);
+    return {scale * glm::length(glm::dvec3(glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper)))), sizeOf(body),
+            scale * double(body.collider.field().voxelSize())};
 }
 
 Extent extentOf(const Convex& convex, double scale) {
@@ -63,9 +57,8 @@ Extent extentOf(const Convex& convex, double scale) {
 
 Extent extentOf(const PlacedShape& body) {
     const auto& shape = body.shape.data().shape;
-    const auto scale = double(body.scale);
-    if (const auto* collider = std::get_if<Collider>(&shape)) return extentOf(*collider, scale);
-    if (const auto* convex = std::get_if<Convex>(&shape)) return extentOf(*convex, scale);
+    if (body.shape.collider()) return extentOf(placed(body));
+    if (const auto* convex = std::get_if<Convex>(&shape)) return extentOf(*convex, double(body.scale));
     if (body.motion.rotation != glm::vec3(0))
         throw std::invalid_argument("a plane or a sheet of triangles has no end, and must not rotate");
     return {};
@@ -76,31 +69,54 @@ double toleranceFor(const Extent& a, const Extent& b, float asked) {
     return std::max(wanted, minTolerance * std::max(a.size, b.size));
 }
 
+/// A body and its motion.
+struct MovingBody {
+    const PlacedShape& body;
+    Sweep sweep;
+
+    explicit MovingBody(const PlacedShape& placed) : body(placed), sweep(placed.pose, placed.motion) {
+        check(placed.motion);
+    }
+    PlacedShape at(double fraction) const { return {body.shape, sweep.at(fraction), body.scale}; }
+    SweptShape swept() const { return {body.shape, sweep, {}, body.scale}; }
+};
+
+Impact firstTouch(const MovingBody& a, const MovingBody& b, float askedTolerance) {
+    const Extent ofA = extentOf(a.body), ofB = extentOf(b.body);
+    const double tolerance = toleranceFor(ofA, ofB, askedTolerance);
+    const double approach = maxApproach(a.sweep, ofA.radius, b.sweep, ofB.radius);
+    const auto fractionAt = [&](double travelled) { return approach > 0 ? travelled / approach : 0; };
+    BodyDistance separation;
+    DistanceStart start;
+    const auto clearanceAt = [&](double travelled) {
+        const double fraction = fractionAt(travelled);
+        const auto limit = float(approach - travelled + tolerance);
+        separation = distance(a.at(fraction), b.at(fraction), {.maxDistance = limit}, &start);
+        if (!separation.found) return std::numeric_limits<double>::infinity();
+        return separation.overlap == Overlap::none ? double(separation.distance) : 0;
+    };
+    // half of the tolerance is left, so that the bodies come near, and never touch
+    const auto touch = firstNear(approach, tolerance, 0.5 * tolerance, std::numeric_limits<int>::max(), clearanceAt);
+    if (!touch) return {};
+    const double fraction = fractionAt(*touch);
+    return {true, float(fraction), a.sweep.at(fraction), b.sweep.at(fraction), separation};
+}
+
+Impact penetration(const MovingBody& a, const MovingBody& b) {
+    const Penetration first = firstPenetration(a.swept(), b.swept());
+    if (!first.found()) return {};
+    const auto fraction = double(first.time);
+    const BodyDistance place{
+        .found = true, .distance = 0, .a = {first.position}, .b = {first.position}, .normal = first.normal};
+    return {true, first.time, a.sweep.at(fraction), b.sweep.at(fraction), place};
+}
+
 }  // namespace
 
 Impact timeOfImpact(const PlacedShape& a, const PlacedShape& b, const ImpactOptions& options) {
-    check(a.motion);
-    check(b.motion);
-    const Extent ofA = extentOf(a), ofB = extentOf(b);
-    const double tolerance = toleranceFor(ofA, ofB, options.tolerance);
-    const auto rotationOf = [](const PlacedShape& body, const Extent& extent) {
-        return glm::length(glm::dvec3(body.motion.rotation)) * extent.radius;
-    };
-    // no two points approach by more in the whole motion
-    const double approach = glm::distance(glm::dvec3(a.motion.displacement), glm::dvec3(b.motion.displacement)) +
-                            rotationOf(a, ofA) + rotationOf(b, ofB);
-    DistanceStart start;
-    for (double fraction = 0; fraction <= 1;) {
-        const PlacedShape nowA = after(a, fraction), nowB = after(b, fraction);
-        const auto limit = float(approach * (1 - fraction) + tolerance);
-        const BodyDistance separation = distance(nowA, nowB, {.maxDistance = limit}, &start);
-        if (!separation.found) return {};
-        if (separation.overlap != Overlap::none || separation.distance <= tolerance)
-            return {true, float(fraction), nowA.pose, nowB.pose, separation};
-        // half of the tolerance is left, so that the bodies come near, and never touch
-        fraction += (double(separation.distance) - 0.5 * tolerance) / approach;
-    }
-    return {};
+    orderOf(a, b);
+    const MovingBody movingA(a), movingB(b);
+    return options.penetration ? penetration(movingA, movingB) : firstTouch(movingA, movingB, options.tolerance);
 }
 
 Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options) {

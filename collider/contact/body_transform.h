@@ -5,6 +5,7 @@
 
 #include <bilayer/collider/contact.h>
 
+#include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
@@ -22,13 +23,23 @@ struct BodyTransform {
     glm::vec3 shift;
     float scale;  ///< the factor by which `linear` scales lengths
 
-    BodyTransform(const Placed& from, const Placed& into) : scale(from.scale / into.scale) {
-        const Pose pose = relative(into.pose, from.pose);
+    BodyTransform(const Pose& from, float fromScale, const Pose& into, float intoScale) : scale(fromScale / intoScale) {
+        const Pose pose = relative(into, from);
         linear = scale * glm::mat3_cast(pose.rotation);
-        shift = pose.position / into.scale;
+        shift = pose.position / intoScale;
     }
+    BodyTransform(const Placed& from, const Placed& into)
+        : BodyTransform(from.pose, from.scale, into.pose, into.scale) {}
     glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
     glm::vec3 rotated(const glm::vec3& direction) const { return linear * direction / scale; }
+
+    /// A box that holds a transformed box, grown by a distance there.
+    Bounds boxAround(const Bounds& box, float reach) const {
+        const glm::vec3 centre = (*this)(box.centre()), half = 0.5f * box.size();
+        const glm::vec3 extent =
+            glm::abs(linear[0]) * half.x + glm::abs(linear[1]) * half.y + glm::abs(linear[2]) * half.z + reach;
+        return {centre - extent, centre + extent};
+    }
 
     /// The same transform, into the coarse cells of a field's clearance.
     BodyTransform intoCoarseCells(const Field& field) const {

@@ -55,23 +55,21 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
     const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {
         return feature < body.collider.data().points().points().size() ? 0.f : -1.f;
     };
-    const auto addOfA = [&](std::uint32_t index, const SurfacePoint& point, const SurfaceSample& sample) {
-        const glm::vec3 normal = outwardNormal(b, sample, a, point);
-        if (!passes(normal, a, b, point, sample)) return;
-        const float distance = sample.distance * b.scale;
-        contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index,
-                            sample.approach * b.scale, turningRadiusOf(a, index)});
-    };
-    const auto addOfB = [&](std::uint32_t index, const SurfacePoint& point, const SurfaceSample& sample) {
-        const glm::vec3 normal = outwardNormal(a, sample, b, point);
-        if (!passes(normal, b, a, point, sample)) return;
-        contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, sample.distance * a.scale,
-                            index | featureOfB, sample.approach * a.scale, turningRadiusOf(b, index)});
+    const auto addOf = [&](const Placed& body, const Placed& other, bool isB) {
+        return [&, isB](std::uint32_t index, const SurfacePoint& point, const SurfaceSample& sample) {
+            const glm::vec3 normal = outwardNormal(other, sample, body, point);
+            if (!passes(normal, body, other, point, sample)) return;
+            const glm::vec3 place = body.pose.toWorld(body.scale * point.position);
+            const float distance = sample.distance * other.scale;
+            contacts.push_back({isB ? place : place - distance * normal, isB ? -normal : normal, distance,
+                                isB ? index | featureOfB : index, sample.approach * other.scale,
+                                turningRadiusOf(body, index)});
+        };
     };
     const std::size_t first = contacts.size();
-    visitA(PointsInField(a, b, options), report, addOfA);
+    visitA(PointsInField(a, b, options), report, addOf(a, b, false));
     const std::size_t second = contacts.size();
-    visitB(PointsInField(b, a, options), report, addOfB);
+    visitB(PointsInField(b, a, options), report, addOf(b, a, true));
     // edges are found next to their points; sorting moves them after all points
     const auto byFeature = [](const Contact& one, const Contact& other) { return one.feature < other.feature; };
     std::stable_sort(contacts.begin() + std::ptrdiff_t(first), contacts.begin() + std::ptrdiff_t(second), byFeature);

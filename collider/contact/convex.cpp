@@ -141,10 +141,10 @@ void Convex::listFacesAround() {
     std::partial_sum(firstAround_.begin(), firstAround_.end(), firstAround_.begin());
 }
 
-Convex Convex::spheres(std::vector<MultisphereHull::Sphere> spheres) {
+Convex Convex::spheres(std::vector<SphereOfHull> spheres) {
     Convex convex(Core::spheres, 0);
     convex.sphereHull_ = MultisphereHull(std::move(spheres));
-    for (const MultisphereHull::Sphere& sphere : convex.sphereHull_.spheres()) {
+    for (const SphereOfHull& sphere : convex.sphereHull_.spheres()) {
         convex.mesh_.points.push_back(sphere.centre);
         convex.radii_.push_back(sphere.radius);
         convex.radius_ = std::max(convex.radius_, sphere.radius);

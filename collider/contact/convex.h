@@ -37,7 +37,7 @@ class Convex {
     /// @param radius                    growth
     static Convex revolution(int axis, float halfHeight, float lowerRadius, float upperRadius, float radius);
     static Convex hull(const HullSurface& surface, float radius);
-    static Convex spheres(std::vector<MultisphereHull::Sphere> spheres);
+    static Convex spheres(std::vector<SphereOfHull> spheres);
 
     /// The nearest point of the surface. For a hull, beyond `reach` outside, the distance is only a lower bound.
     NearestPoint nearest(const glm::vec3& point, float reach) const;

@@ -28,8 +28,6 @@ constexpr int maxRefinements = 6;
 // Faces with a smaller slope lie flat on the other surface: the next surface points are as deep to 0.01 voxels.
 constexpr float minDownhill = 0.05f;
 constexpr float touchingFace = 0.25f;  // [voxels]
-// Normals within one degree belong to one face (cosine).
-constexpr float straight = 0.99985f;
 // A path meets a convex body at this distance [voxels]; a larger tolerance would hit edges that the path passes.
 constexpr float sweepTolerance = 1e-3f;
 
@@ -276,7 +274,7 @@ class PointsOnConvex {
             // no farther than the border of the face
             const NearestPoint last = convex_.nearest(start - step / steepness * uphill, step);
             end = last.core + last.radius * last.normal;
-            isWithinFace = glm::dot(last.normal, nearest.normal) > straight;
+            isWithinFace = glm::dot(last.normal, nearest.normal) > sameFaceCosine;
         }
         const ProbedEdge path{[&, to = body_.intoField(end)](float fraction) { return glm::mix(place, to, fraction); },
                               {0, 0},

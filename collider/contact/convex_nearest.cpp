@@ -19,8 +19,6 @@ namespace {
 
 // A normal within this of the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
-// Normals within half a degree belong to one face (cosine).
-constexpr float sameNormal = 0.99996f;
 // Limit of steps in the search for the entry of a path; longer searches only graze.
 constexpr int maxSteps = 64;
 // From this fraction of the half height on, a point on the side is on a rim.
@@ -198,7 +196,7 @@ bool Convex::isFlat(const NearestPoint& nearest) const {
 // On an edge or a vertex of a hull that is grown by a radius: its normal is no face's.
 bool Convex::isRounded(const NearestPoint& nearest) const {
     return core_ == Core::hull && radius_ > 0 && std::none_of(faces_.begin(), faces_.end(), [&](const HullFace& face) {
-               return glm::dot(face.normal, nearest.normal) > sameNormal;
+               return glm::dot(face.normal, nearest.normal) > sameFaceCosine;
            });
 }
 

@@ -94,15 +94,13 @@ unsigned boundDistances(const OrientedBounds& box, const OrientedGroup& group, c
     return near;
 }
 
-// The triangles of a leaf. A halved triangle may have several parts in it.
-struct LeafTriangles {
+// The triangles of a leaf with their corners.
+struct PosedLeaf {
     void take(const PosedTree& mesh, std::uint32_t index) {
         if (index == leaf) return;
         leaf = index;
         count = 0;
-        for (const std::uint32_t triangle : mesh.tree().leaves[leaf].triangles) {
-            const auto end = indices.begin() + std::ptrdiff_t(count);
-            if (std::find(indices.begin(), end, triangle) != end) continue;
+        for (const std::uint32_t triangle : LeafTriangles(mesh.tree().leaves[leaf])) {
             indices[count] = triangle;
             corners[count] = mesh.corners(triangle);
             setLanes(count++);
@@ -129,18 +127,18 @@ struct LeafTriangles {
 // The triangles of the leaves of a mesh that were measured last.
 class LeafCache {
   public:
-    const LeafTriangles& of(const PosedTree& mesh, std::uint32_t leaf) {
-        LeafTriangles& triangles = leaves_[leaf % leaves_.size()];
+    const PosedLeaf& of(const PosedTree& mesh, std::uint32_t leaf) {
+        PosedLeaf& triangles = leaves_[leaf % leaves_.size()];
         triangles.take(mesh, leaf);
         return triangles;
     }
 
   private:
-    std::array<LeafTriangles, 16> leaves_;
+    std::array<PosedLeaf, 16> leaves_;
 };
 
 // The triangles of a leaf that are nearer to a triangle than a limit, as bits.
-unsigned nearerThan(const TriangleCorners& triangle, const LeafTriangles& leaf, double limit2) {
+unsigned nearerThan(const TriangleCorners& triangle, const PosedLeaf& leaf, double limit2) {
     using D = hn::CappedTag<double, treeWidth>;
     const D tag;
     const TriangleLanes<D> one(sameInAll(tag, triangle[0]), sameInAll(tag, triangle[1]), sameInAll(tag, triangle[2]));
@@ -227,7 +225,7 @@ class PairSearch {
     }
 
     void measureLeaves(std::uint32_t a, std::uint32_t b) {
-        const LeafTriangles &ofA = leavesA_.of(a_, a), &ofB = leavesB_.of(b_, b);
+        const PosedLeaf &ofA = leavesA_.of(a_, a), &ofB = leavesB_.of(b_, b);
         // a copy: measure() changes the direction, and the limits of this leaf must keep to one
         const auto along = [direction = direction_](const TriangleCorners& c) {
             return std::array{glm::dot(direction, c[0]), glm::dot(direction, c[1]), glm::dot(direction, c[2])};

@@ -22,7 +22,7 @@ glm::dvec3 perpendicularTo(const glm::dvec3& axis) {
 
 }  // namespace
 
-MultisphereHull::MultisphereHull(std::vector<Sphere> spheres) {
+MultisphereHull::MultisphereHull(std::vector<SphereOfHull> spheres) {
     for (std::size_t i = 0; i < spheres.size(); ++i) {
         const auto isContainedIn = [&](std::size_t j) {
             const float excess = spheres[j].radius - spheres[i].radius;
@@ -35,7 +35,7 @@ MultisphereHull::MultisphereHull(std::vector<Sphere> spheres) {
         if (!isContained) spheres_.push_back(spheres[i]);
     }
     minRadius_ = std::numeric_limits<float>::max();
-    for (const Sphere& sphere : spheres_) {
+    for (const SphereOfHull& sphere : spheres_) {
         minRadius_ = std::min(minRadius_, sphere.radius);
         size_ = std::max(size_, sphere.radius + glm::distance(sphere.centre, spheres_.front().centre));
     }
@@ -63,14 +63,14 @@ void MultisphereHull::addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t 
     for (const double side : {-1., 1.}) {
         const glm::dvec3 normal = along + side * std::sqrt(rest) * (square / area);
         const double offset = glm::dot(normal, from) + spheres_[i].radius;
-        const auto below = [&](const Sphere& sphere) {
+        const auto below = [&](const SphereOfHull& sphere) {
             return glm::dot(normal, glm::dvec3(sphere.centre)) + sphere.radius <= offset + rounding * size_;
         };
         if (std::all_of(spheres_.begin(), spheres_.end(), below)) planes_.push_back({normal, offset, {i, j, k}});
     }
 }
 
-MultisphereHull::Candidate MultisphereHull::aroundSphere(const Sphere& sphere, const glm::dvec3& point) const {
+MultisphereHull::Candidate MultisphereHull::aroundSphere(const SphereOfHull& sphere, const glm::dvec3& point) const {
     const glm::dvec3 centre(sphere.centre);
     const double length = glm::distance(point, centre);
     return {length - sphere.radius, length > 0 ? (point - centre) / length : glm::dvec3(0, 0, 1), centre,
@@ -78,7 +78,7 @@ MultisphereHull::Candidate MultisphereHull::aroundSphere(const Sphere& sphere, c
 }
 
 /// Nearest point on the surface of the spheres between two spheres.
-MultisphereHull::Candidate MultisphereHull::aroundPair(const Sphere& from, const Sphere& to,
+MultisphereHull::Candidate MultisphereHull::aroundPair(const SphereOfHull& from, const SphereOfHull& to,
                                                        const glm::dvec3& point) const {
     const glm::dvec3 start(from.centre), between = glm::dvec3(to.centre) - start;
     const double length = glm::length(between), growth = double(to.radius) - from.radius;
@@ -103,12 +103,13 @@ NearestPoint MultisphereHull::nearest(const glm::vec3& place) const {
     const auto consider = [&](const Candidate& candidate) {
         if (candidate.distance < best.distance) best = candidate;
     };
-    for (const Sphere& sphere : spheres_) consider(aroundSphere(sphere, point));
+    for (const SphereOfHull& sphere : spheres_) consider(aroundSphere(sphere, point));
     for (const auto& [i, j] : pairs_) consider(aroundPair(spheres_[i], spheres_[j], point));
     for (const TangentPlane& plane : planes_) {
         const double distance = glm::dot(plane.normal, point) - plane.offset;
         if (distance >= best.distance) continue;
-        const Sphere &a = spheres_[plane.corners[0]], &b = spheres_[plane.corners[1]], &c = spheres_[plane.corners[2]];
+        const SphereOfHull &a = spheres_[plane.corners[0]], &b = spheres_[plane.corners[1]],
+                           &c = spheres_[plane.corners[2]];
         const glm::dvec3 from(a.centre), u = glm::dvec3(b.centre) - from, v = glm::dvec3(c.centre) - from,
                                          square = glm::cross(u, v);
         // The line along the normal through the plane of the centres: the tangent plane is on the hull only between the
@@ -131,7 +132,7 @@ NearestPoint MultisphereHull::nearest(const glm::vec3& place) const {
 /// The distance from a point to the hull's support plane in a direction.
 double MultisphereHull::along(const glm::dvec3& direction, const glm::dvec3& point) const {
     double minDistance = std::numeric_limits<double>::max();
-    for (const Sphere& sphere : spheres_)
+    for (const SphereOfHull& sphere : spheres_)
         minDistance = std::min(minDistance, glm::dot(direction, point - glm::dvec3(sphere.centre)) - sphere.radius);
     return minDistance;
 }
@@ -143,7 +144,7 @@ MultisphereHull::Candidate MultisphereHull::inside(const glm::dvec3& point) cons
         const double distance = along(normal, point);
         if (distance > best.distance) best.distance = distance, best.normal = normal;
     };
-    for (const Sphere& sphere : spheres_) consider(aroundSphere(sphere, point).normal);
+    for (const SphereOfHull& sphere : spheres_) consider(aroundSphere(sphere, point).normal);
     for (const auto& [i, j] : pairs_) consider(aroundPair(spheres_[i], spheres_[j], point).normal);
     for (const TangentPlane& plane : planes_) consider(plane.normal);
     best.centre = point - (best.distance + minRadius_) * best.normal;

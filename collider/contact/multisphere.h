@@ -8,27 +8,23 @@
 #include <utility>
 #include <vector>
 
+#include <bilayer/collider/shapes.h>
 #include "collider/contact/nearest_point.h"
 
 namespace bilayer::detail {
 
 class MultisphereHull {
   public:
-    struct Sphere {
-        glm::vec3 centre;  ///< [m]
-        float radius;      ///< not negative [m]
-    };
-
     MultisphereHull() = default;
     /// Takes at least one sphere. Takes O(n^4) time for n of them.
-    explicit MultisphereHull(std::vector<Sphere> spheres);
+    explicit MultisphereHull(std::vector<SphereOfHull> spheres);
 
     /// The nearest point of the surface. Its core point is the centre of a sphere inside the hull that touches the
     /// surface there. Exact up to rounding, outside and inside. Takes O(n^2) outside, O(n^3) inside.
     NearestPoint nearest(const glm::vec3& point) const;
 
     /// The spheres that no other one contains.
-    const std::vector<Sphere>& spheres() const { return spheres_; }
+    const std::vector<SphereOfHull>& spheres() const { return spheres_; }
     /// Pairs of spheres with a tangent cone; some cones may be inside the hull.
     const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs() const { return pairs_; }
 
@@ -46,12 +42,12 @@ class MultisphereHull {
         double radius;
     };
     void addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k);
-    Candidate aroundSphere(const Sphere& sphere, const glm::dvec3& point) const;
-    Candidate aroundPair(const Sphere& from, const Sphere& to, const glm::dvec3& point) const;
+    Candidate aroundSphere(const SphereOfHull& sphere, const glm::dvec3& point) const;
+    Candidate aroundPair(const SphereOfHull& from, const SphereOfHull& to, const glm::dvec3& point) const;
     Candidate inside(const glm::dvec3& point) const;
     double along(const glm::dvec3& direction, const glm::dvec3& point) const;
 
-    std::vector<Sphere> spheres_;
+    std::vector<SphereOfHull> spheres_;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
     std::vector<TangentPlane> planes_;
     float size_ = 0, minRadius_ = 0;  ///< [m]

@@ -14,6 +14,10 @@
 
 namespace bilayer::detail {
 
+/// Collides a field with a shape that is no collider.
+ContactReport collideShape(const PlacedShape& shape, const Placed& field, const ContactOptions& options,
+                           std::vector<Contact>& contacts);
+
 /// Collides a field with a half-space in world coordinates. With ContactOptions::exact, the lowest vertex of the mesh
 /// also makes a contact.
 ContactReport collideHalfSpace(const HalfSpace& solid, const Motion& motion, const Placed& field,

@@ -7,6 +7,9 @@
 
 namespace bilayer::detail {
 
+/// Normals within half a degree belong to one face (cosine).
+inline constexpr float sameFaceCosine = 0.99996f;
+
 struct NearestPoint {
     float distance;    ///< signed, to the surface [m]
     glm::vec3 normal;  ///< outward normal of the surface there, of unit length

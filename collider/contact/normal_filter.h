@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
+#include "collider/contact/nearest_point.h"
+
 namespace bilayer::detail {
 
 /// Points that slide along a face hit the edges beyond it by rounding. Hits shallower than this are ignored [voxels].
@@ -67,10 +69,9 @@ bool passesNormalFilter(const ContactOptions& options, const glm::vec3& surfaceN
 template <class NormalAt>
 bool facesEdgeObliquely(const glm::vec3& position, const glm::vec3& normal, float distance,
                         const glm::vec3& surfaceNormal, NormalAt&& normalAt) {
-    // within half a degree of the normal
-    constexpr float straight = 0.99996f, straighter = 0.1f;
+    constexpr float straighter = 0.1f;
     const float cosine = -glm::dot(surfaceNormal, normal);
-    if (cosine > straight) return false;
+    if (cosine > sameFaceCosine) return false;
     const glm::vec3 there = normalAt(position - distance * surfaceNormal - cosine * distance * normal);
     return 1 + glm::dot(there, normal) < straighter * (1 - cosine);
 }

@@ -47,6 +47,21 @@ inline glm::dmat3 orthonormal(const glm::dmat3& m) {
     return {x, y, glm::dot(z, m[2]) < 0 ? -z : z};
 }
 
+/// The triangles of a leaf, each once: a halved triangle may have several parts in it.
+struct LeafTriangles {
+    std::size_t count = 0;
+    std::array<std::uint32_t, treeWidth> indices;
+
+    explicit LeafTriangles(const WideLeaf& leaf) {
+        for (const std::uint32_t triangle : leaf.triangles)
+            if (const auto last = indices.begin() + std::ptrdiff_t(count);
+                std::find(indices.begin(), last, triangle) == last)
+                indices[count++] = triangle;
+    }
+    auto begin() const { return indices.begin(); }
+    auto end() const { return indices.begin() + std::ptrdiff_t(count); }
+};
+
 /// A mesh with its hierarchy in the common frame. For use by one thread: keeps the frames of groups that are used
 /// again.
 class PosedTree {

@@ -36,10 +36,20 @@ HalfSpace inWorld(const HalfSpace& solid, const Pose& pose) {
     return {normal, solid.offset + glm::dot(normal, pose.position)};
 }
 
-/// Adds the contacts of another shape A with the field B. They are found in units of the shape's scale, in which the
-/// shape has its own size.
-ContactReport collideField(const PlacedShape& a, const Placed& b, ContactOptions options,
-                           std::vector<Contact>& contacts) {
+/// The contact as seen with the bodies in the other order.
+Contact swapped(Contact contact) {
+    contact.position += contact.distance * contact.normal;
+    contact.normal = -contact.normal;
+    contact.feature ^= featureOfB;
+    return contact;
+}
+
+}  // namespace
+
+/// Contacts are found in units of the shape's scale, in which the shape has its own size.
+ContactReport detail::collideShape(const PlacedShape& a, const Placed& b, const ContactOptions& asked,
+                                   std::vector<Contact>& contacts) {
+    ContactOptions options = asked;
     const Units units{a.scale};
     const Placed field = units.into(b);
     const Pose pose = units.into(a.pose);
@@ -65,16 +75,6 @@ ContactReport collideField(const PlacedShape& a, const Placed& b, ContactOptions
     return report;
 }
 
-/// The contact as seen with the bodies in the other order.
-Contact swapped(Contact contact) {
-    contact.position += contact.distance * contact.normal;
-    contact.normal = -contact.normal;
-    contact.feature ^= featureOfB;
-    return contact;
-}
-
-}  // namespace
-
 Order detail::orderOf(const PlacedShape& a, const PlacedShape& b) {
     for (const PlacedShape* body : {&a, &b})
         if (!(body->scale > 0) || !std::isfinite(body->scale))
@@ -90,7 +90,7 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
     if (order.both) return collide(placed(a), placed(b), options, contacts, cache);
     const std::size_t first = contacts.size();
     const ContactReport report =
-        order.isSwapped ? collideField(b, placed(a), options, contacts) : collideField(a, placed(b), options, contacts);
+        order.isSwapped ? collideShape(b, placed(a), options, contacts) : collideShape(a, placed(b), options, contacts);
     if (order.isSwapped)
         for (std::size_t i = first; i < contacts.size(); ++i) contacts[i] = swapped(contacts[i]);
     if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);

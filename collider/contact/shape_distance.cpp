@@ -8,11 +8,11 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <optional>
 #include <variant>
 #include <vector>
 
 #include "collider/contact/body_distance.h"
+#include "collider/contact/body_transform.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/placed_shapes.h"
 #include "collider/contact/shape_data.h"
@@ -24,18 +24,18 @@ using namespace detail;
 
 namespace {
 
-/// A shape A and a collider B.
+/// A shape A and a collider B, where they are: motions are left out.
 struct ShapeAndCollider {
-    const PlacedShape& a;
+    PlacedShape a, shapeOfB;
     Placed b;
-    Similarity aToWorld, bToWorld, aToB;
+    Similarity bToWorld, aToB;
 
-    ShapeAndCollider(const PlacedShape& a, const Placed& b)
-        : a(a),
-          b(b),
-          aToWorld(toWorld(a.pose, a.scale)),
+    ShapeAndCollider(const PlacedShape& a, const PlacedShape& b)
+        : a{a.shape, a.pose, a.scale},
+          shapeOfB{b.shape, b.pose, b.scale},
+          b(placed(shapeOfB)),
           bToWorld(toWorld(b.pose, b.scale)),
-          aToB(aToWorld.into(bToWorld)) {}
+          aToB(toWorld(a.pose, a.scale).into(bToWorld)) {}
 
     const MeshTree& mesh() const { return b.collider.data().meshTree(); }
 };
@@ -60,7 +60,7 @@ void take(BodyDistance& deepest, const BodyDistance& other) {
 /// The deepest contact of collide(); nothing found if there is none.
 BodyDistance deepestContact(const ShapeAndCollider& bodies) {
     std::vector<Contact> contacts;
-    collide(bodies.a, {ContactShape(bodies.b.collider), bodies.b.pose, bodies.b.scale}, {.exact = true}, contacts);
+    collide(bodies.a, bodies.shapeOfB, {.exact = true}, contacts);
     BodyDistance deepest;
     for (const Contact& contact : contacts)
         take(deepest, {.found = true,
@@ -161,27 +161,17 @@ BodyDistance distanceOf(const HalfSpace& solid, const ShapeAndCollider& bodies, 
     return answer;
 }
 
-/// The box around the mesh of B in coordinates of the sheet A, grown by a distance there.
-Bounds boxAround(const ShapeAndCollider& bodies, float reach) {
-    const Bounds& own = bodies.b.collider.bounds();
-    const Similarity bToA = bodies.aToB.inverted();
-    Bounds box;
-    for (int corner = 0; corner < 8; ++corner)
-        box.add(
-            glm::vec3(bToA(glm::dvec3(corner & 1 ? own.lower.x : own.upper.x, corner & 2 ? own.lower.y : own.upper.y,
-                                      corner & 4 ? own.lower.z : own.upper.z))));
-    return {box.lower - reach, box.upper + reach};
-}
-
 /// Asks for triangles in boxes that grow until the nearest one must be among them.
 BodyDistance distanceOf(const TriangleSheet& sheet, const ShapeAndCollider& bodies, double limit,
                         DistanceStart& start) {
     constexpr float maxReach = 1e30f;
     const double scale = bodies.aToB.scale;
+    const BodyTransform intoSheet(bodies.b.pose, bodies.b.scale, bodies.a.pose, bodies.a.scale);
     SolidDistance best;
     best.distance = limit;
     const auto search = [&](float reach) {
-        sheet.visit(boxAround(bodies, reach), [&](const Triangle& triangle, std::uint64_t) {
+        sheet.visit(intoSheet.boxAround(bodies.b.collider.bounds(), reach), [&](const Triangle& triangle,
+                                                                                std::uint64_t) {
             if (!(best.distance > 0)) return;
             const SolidDistance found = nearestTo(triangle, bodies.mesh(), bodies.aToB, best.distance, start.triangleB);
             if (found.found() && found.distance < best.distance) best = found;
@@ -208,7 +198,7 @@ BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const Distance
                       DistanceStart* start) {
     const Order order = orderOf(a, b);
     if (order.both) return distance(placed(a), placed(b), options, start);
-    const ShapeAndCollider bodies(order.isSwapped ? b : a, placed(order.isSwapped ? a : b));
+    const ShapeAndCollider bodies(order.isSwapped ? b : a, order.isSwapped ? a : b);
     const double limit = std::max(double(options.maxDistance), 0.0) / double(bodies.b.scale);
     DistanceStart own;
     if (start) own.triangleB = order.isSwapped ? start->triangleA : start->triangleB;

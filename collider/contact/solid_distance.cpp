@@ -162,7 +162,8 @@ class SolidSearch {
             const Pending next = stack_[--pending_];
             if (!(next.bound < best_.distance)) continue;
             if (mesh_.tree().isLeaf(next.node.index))
-                for (const std::uint32_t triangle : mesh_.tree().leaves[next.node.index].triangles) measure(triangle);
+                for (const std::uint32_t triangle : LeafTriangles(mesh_.tree().leaves[next.node.index]))
+                    measure(triangle);
             else
                 open(next.node.index);
         }

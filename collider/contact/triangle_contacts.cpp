@@ -8,9 +8,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <glm/mat3x3.hpp>
 #include <optional>
 
+#include "collider/contact/body_transform.h"
 #include "collider/contact/face_contacts.h"
 #include "collider/contact/narrow_phase.h"
 #include "collider/contact/nearby_triangles.h"
@@ -105,17 +105,6 @@ float maxSide(const Triangle& corners) {
     return side;
 }
 
-/// The box of a field in the coordinates of a sheet.
-/// @param reach  growth [m]
-Bounds boxIn(const Pose& inSheet, const Placed& field, float reach) {
-    const Bounds& bounds = field.collider.bounds();
-    const glm::vec3 centre = inSheet.toWorld(field.scale * bounds.centre());
-    const glm::vec3 half = 0.5f * field.scale * bounds.size() + reach;
-    const glm::mat3 axes = glm::mat3_cast(inSheet.rotation);
-    const glm::vec3 extent = glm::abs(axes[0]) * half.x + glm::abs(axes[1]) * half.y + glm::abs(axes[2]) * half.z;
-    return {centre - extent, centre + extent};
-}
-
 }  // namespace
 
 ContactReport collideTriangles(const TriangleSheet& sheet, const Pose& pose, const Motion& motion, const Placed& field,
@@ -123,7 +112,8 @@ ContactReport collideTriangles(const TriangleSheet& sheet, const Pose& pose, con
     ContactReport report;
     const ProbedField probed(field, pose, motion, options);
     NearbyTriangles triangles(probed, relative(field.pose, pose));
-    sheet.visit(boxIn(relative(pose, field.pose), field, probed.maxTriangleDistance()),
+    const BodyTransform intoSheet(field.pose, field.scale, pose, 1);
+    sheet.visit(intoSheet.boxAround(field.collider.bounds(), probed.maxTriangleDistance()),
                 [&](const Triangle& corners, std::uint64_t id) { triangles.add(corners, id); });
     triangles.connect();
 

@@ -24,7 +24,7 @@ struct TrianglePair {
 };
 
 /// The triangles may be degenerate: to segments or points. The error of the distance is some roundings of the largest
-/// coordinate difference.
+/// coordinate difference; over the inside of a sliver, times its length over its width.
 TrianglePair closestPoints(const TriangleCorners& a, const TriangleCorners& b);
 
 }  // namespace bilayer::detail

@@ -33,7 +33,7 @@ struct TriangleLanes {
             edges[i] = corners[(i + 1) % 3] - corners[i];
             lengths2[i] = dot<D>(edges[i], edges[i]);
         }
-        normal = cross<D>(edges[0], edges[1]);
+        normal = cross<D>(edges[2], edges[0]);  // to the bit as in triangle_distance.cpp
     }
 };
 

@@ -14,7 +14,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -22,16 +21,11 @@
 #include "collider/field/mesh_tree.h"
 #include "collider/field/path.h"
 #include "collider/field/tree_place.h"
-#include "sdf/bvh/node_stack.h"
+#include "sdf/bvh/ray_slabs.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace {
-
-/// Min speed along an axis; below it the ray moves less than a voxel over the longest path.
-constexpr float slowest = 1e-9f;
-/// Tolerance for the rounding of a quotient.
-constexpr float quotientRoundUp = 1 + 1e-6f;
 
 // The traversal of one tree along one path.
 class RayTraversal {
@@ -40,14 +34,8 @@ class RayTraversal {
         : tree_(mesh.tree()),
           place_(mesh, path.origin),
           direction_(path.direction),
+          slabs_(place_.point, direction_, place_.slack),
           perMetre_(1 / double(mesh.voxelSize())) {
-        for (int k = 0; k < 3; ++k) {
-            const bool down = direction_[k] < 0;
-            perDirection_[k] = (down ? -1 : 1) / std::max(std::abs(direction_[k]), slowest);
-            forward_[k] = !down;
-            nearOrigin_[k] = place_.point[k] + (down ? -place_.slack : place_.slack);
-            farOrigin_[k] = place_.point[k] - (down ? -place_.slack : place_.slack);
-        }
         limitTo(path.length);
     }
 
@@ -61,31 +49,11 @@ class RayTraversal {
     void run(Visit visit) {
         descend(
             tree_, tree_.root(), [&](float key) { return key > limit_; },
-            [&](std::uint32_t group, NodeStack& stack) { open(tree_.groups[group], stack); },
+            [&](std::uint32_t group, NodeStack& stack) { slabs_.pushMet(tree_.groups[group], limit_, stack); },
             [&](std::uint32_t leaf) { return visitLeaf(tree_.leaves[leaf], visit), false; });
     }
 
   private:
-    // Slab test: T. Kay, J. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986, 269-278.
-    void open(const BoxGroup& group, NodeStack& stack) const {
-        const Tag tag;
-        alignas(64) float enters[treeWidth];
-        unsigned met = 0;
-        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
-            Vec enter = hn::Zero(tag), leave = hn::Set(tag, limit_);
-            for (int k = 0; k < 3; ++k) {
-                const float* first = forward_[k] ? group.lower[k] : group.upper[k];
-                const float* second = forward_[k] ? group.upper[k] : group.lower[k];
-                const Vec per = hn::Set(tag, perDirection_[k]);
-                enter = hn::Max(enter, hn::Mul(hn::Sub(hn::Load(tag, first + i), hn::Set(tag, nearOrigin_[k])), per));
-                leave = hn::Min(leave, hn::Mul(hn::Sub(hn::Load(tag, second + i), hn::Set(tag, farOrigin_[k])), per));
-            }
-            hn::Store(enter, tag, enters + i);
-            met |= bitsOf(hn::Le(enter, hn::Mul(leave, hn::Set(tag, quotientRoundUp)))) << i;
-        }
-        stack.pushChildren(met, enters, group.firstChild);
-    }
-
     // A bit mask of the triangles that the line passes, each in its own frame. All terms are multiplied by the cosine
     // between line and normal. Distances in the plane thereby become distances from the line, at any angle.
     unsigned passed(const WideLeaf& leaf, std::size_t i) const {
@@ -129,10 +97,9 @@ class RayTraversal {
     const WideTree& tree_;
     TreePlace place_;
     glm::vec3 direction_;
+    RaySlabs slabs_;
     double perMetre_;
     float limit_ = 0;
-    float perDirection_[3], nearOrigin_[3], farOrigin_[3];
-    bool forward_[3];
 };
 
 }  // namespace

@@ -13,12 +13,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 
 #include "sdf/base/progress.h"
-#include "sdf/bvh/node_stack.h"
+#include "sdf/bvh/ray_slabs.h"
 #include "sdf/bvh/tree_lanes.h"
 
 #ifndef BILAYER_SDF_WALLS_ONCE
@@ -71,53 +70,26 @@ namespace {
 
 /// Rounding error of products in floats, relative to the absolute values of their factors; generous.
 constexpr float rounding = 2e-6f;
-/// Direction components below this are replaced by it, so that division is possible.
-constexpr float minDirection = 1e-20f;
 
 // A ray's search for its nearest exit.
 class ExitSearch {
   public:
-    ExitSearch(const TriangleTree& tree, const Ray& ray, float limit) : tree_(tree), ray_(ray), nearest_(limit) {
-        // margin around boxes for rounding [m]
-        const float room = rounding * tree.largestCoordinate();
-        for (int k = 0; k < 3; ++k) {
-            const float d = ray.direction[k];
-            inverse_[k] = 1 / (std::abs(d) < minDirection ? std::copysign(minDirection, d) : d);
-            forward_[k] = inverse_[k] > 0;
-            enter_[k] = -(ray.origin[k] + (forward_[k] ? room : -room)) * inverse_[k];
-            leave_[k] = -(ray.origin[k] - (forward_[k] ? room : -room)) * inverse_[k];
-        }
-    }
+    ExitSearch(const TriangleTree& tree, const Ray& ray, float limit)
+        : tree_(tree),
+          ray_(ray),
+          slabs_(ray.origin, ray.direction, rounding * tree.largestCoordinate()),
+          nearest_(limit) {}
 
     float run() {
         const BoxTree& boxes = tree_.boxes();
         descend(
             boxes, boxes.root(), [&](float entry) { return entry > nearest_; },
-            [&](std::uint32_t group, NodeStack& stack) { open(boxes.groups[group], stack); },
+            [&](std::uint32_t group, NodeStack& stack) { slabs_.pushMet(boxes.groups[group], nearest_, stack); },
             [&](std::uint32_t leaf) { return visit(tree_.leaf(leaf)), false; });
         return nearest_;
     }
 
   private:
-    void open(const BoxGroup& group, NodeStack& stack) const {
-        const Tag tag;
-        alignas(64) float entries[treeWidth];
-        unsigned met = 0;
-        for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(tag)) {
-            Vec enter = hn::Zero(tag), leave = hn::Set(tag, nearest_);
-            for (int k = 0; k < 3; ++k) {
-                const Vec inverse = hn::Set(tag, inverse_[k]);
-                const auto* near = forward_[k] ? group.lower[k] : group.upper[k];
-                const auto* far = forward_[k] ? group.upper[k] : group.lower[k];
-                enter = hn::Max(enter, hn::MulAdd(hn::Load(tag, near + lane), inverse, hn::Set(tag, enter_[k])));
-                leave = hn::Min(leave, hn::MulAdd(hn::Load(tag, far + lane), inverse, hn::Set(tag, leave_[k])));
-            }
-            hn::Store(enter, tag, entries + lane);
-            met |= bitsOf(hn::Le(enter, leave)) << lane;
-        }
-        stack.pushChildren(met, entries, group.firstChild);
-    }
-
     void visit(const TriangleLeaf& leaf) {
         const Tag tag;
         const PointLanes d = all(ray_.direction);
@@ -150,9 +122,8 @@ class ExitSearch {
 
     const TriangleTree& tree_;
     const Ray& ray_;
+    RaySlabs slabs_;
     float nearest_;
-    bool forward_[3];                         // for each axis
-    float inverse_[3], enter_[3], leave_[3];  // a plane at x is crossed at x * inverse + enter (or leave)
 };
 
 float nearestExit(const TriangleTree& tree, const Ray& ray, float limit) {

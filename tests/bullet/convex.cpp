@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bullet's convex shapes by formula.
-#include "integration/bullet/detail/convex_shape.h"
+#include "integration/bullet/detail/contact_shapes.h"
 
 #include <LinearMath/btConvexHullComputer.h>
 #include <btBulletCollisionCommon.h>

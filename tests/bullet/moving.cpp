@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include <bilayer/integration/bullet/extensions.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
@@ -103,8 +104,8 @@ struct SoftWorld {
         if (body) dynamics.removeRigidBody(body.get());
     }
     btSoftBodyWorldInfo& info() { return dynamics.getWorldInfo(); }
-    void lay(btCollisionShape& shape, const btVector3& place) {
-        btRigidBody::btRigidBodyConstructionInfo its(0, nullptr, &shape);
+    void lay(btCollisionShape& shape, const btVector3& place, float mass = 0) {
+        btRigidBody::btRigidBodyConstructionInfo its(mass, nullptr, &shape, btVector3(mass, mass, mass));
         its.m_startWorldTransform = btTransform(btQuaternion::getIdentity(), place);
         body = std::make_unique<btRigidBody>(its);
         dynamics.addRigidBody(body.get());
@@ -169,4 +170,16 @@ TEST_CASE("Cloth and soft balls come to rest on a field as on its triangles") {
     CHECK(highest == Approx(itsHighest).margin(0.1 * h));
     CHECK(speed < std::max(2 * itsSpeed, 0.1f));
     if (whole) CHECK(lowest > -0.1f * h);
+}
+
+TEST_CASE("Continuous collision passes over soft bodies, which are no shapes of its surfaces") {
+    Shape ball(exactSphere(0.2f, h));
+    SoftWorld world;
+    const bullet::WorldExtensions extensions(world.dynamics);
+    world.soft.reset(btSoftBodyHelpers::CreateEllipsoid(world.info(), {0, 0, 0}, {0.3f, 0.3f, 0.3f}, 50));
+    world.dynamics.addSoftBody(world.soft.get());
+    world.lay(ball, {0, 0, 1}, 1);
+    world.body->setLinearVelocity({0, 0, -400});
+    for (int i = 0; i < 4; ++i) world.dynamics.stepSimulation(step, 1, step);
+    CHECK(world.body->getWorldTransform().getOrigin().z() < 0);
 }

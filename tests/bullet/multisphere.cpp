@@ -14,7 +14,7 @@
 #include "collider/contact/narrow_phase.h"
 #include "demos/shared/exact_distance.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/convex_shape.h"
+#include "integration/bullet/detail/contact_shapes.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -37,7 +37,7 @@ TEST_CASE("The distance from a multisphere is that of its support function, outs
     std::uniform_real_distribution<float> part(-1, 1);
     const auto vector = [&] { return glm::vec3(part(random), part(random), part(random)); };
     for (int run = 0; run < 60; ++run) {
-        std::vector<MultisphereHull::Sphere> balls;
+        std::vector<SphereOfHull> balls;
         for (int i = 0; i <= run % 6; ++i) balls.push_back({0.5f * vector(), 0.02f + 0.2f * std::abs(part(random))});
         if (run % 3 == 0)
             for (auto& ball : balls) ball.radius = 0.2f;

@@ -12,7 +12,7 @@
 #include <bilayer/collider/contact.h>
 #include "collider/contact/narrow_phase.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/detail/triangle_sheet.h"
+#include "integration/bullet/detail/contact_shapes.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
 #include "world.h"

@@ -14,7 +14,7 @@
 #include <bilayer/sdf/build.h>
 #include "collider/contact/narrow_phase.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/detail/triangle_sheet.h"
+#include "integration/bullet/detail/contact_shapes.h"
 #include "world.h"
 
 using namespace bilayer;

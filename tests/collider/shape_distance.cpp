@@ -226,6 +226,13 @@ TEST_CASE("Shapes that overlap a collider are told from those inside of it and a
         CHECK(deep.overlap == Overlap::surfaces);
         CHECK(deep.distance == Approx(-0.01f).margin(0.0008));
         CHECK(glm::dot(deep.normal, up) > 0.95f);
+        // their poses count, not their motions
+        PlacedShape moving{subject.shape, {place, pose.rotation * rotation}, 0.4f}, movingB = b;
+        moving.motion = {random.direction(), random.direction()};
+        movingB.motion = {random.direction(), random.direction()};
+        const BodyDistance same = distance(moving, movingB);
+        CHECK(same.distance == deep.distance);
+        CHECK(same.normal == deep.normal);
     }
 }
 

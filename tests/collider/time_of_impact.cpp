@@ -120,3 +120,54 @@ TEST_CASE("Bodies that overlap touch at the start, and motions that are none are
     b.motion.rotation = {0, 2000, 0};
     CHECK_THROWS_WITH(timeOfImpact(a, b), Catch::Matchers::Contains("1000 rad"));
 }
+
+TEST_CASE("Bodies in contact rest, slide and part without penetration, and penetrate where they move on") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float half = 0.3f;
+    const Collider block = colliderOf(shapes::box({half, half, half}));
+    const float voxel = block.field().voxelSize();
+    const TriangleSheet floor{[](const Bounds& box, const TriangleSheet::Visitor& visitor) {
+        if (box.lower.z > 0 || box.upper.z < 0) return;
+        visitor({glm::vec3(-9, -9, 0), {9, -9, 0}, {9, 9, 0}}, 0);
+        visitor({glm::vec3(-9, -9, 0), {9, 9, 0}, {-9, 9, 0}}, 1);
+    }};
+    const ContactShape box = ContactShape::box({9, 9, 1}), field(colliderOf(shapes::box({3, 3, 1})));
+    const PlacedShape grounds[] = {{field, {{0, 0, -1}}},
+                                   {box, {{0, 0, -1}}},
+                                   {ContactShape::plane({0, 0, 1}, 0)},
+                                   {ContactShape::triangles(floor)}};
+    for (const PlacedShape& ground : grounds)
+        for (int round = 0; round < 10; ++round) {
+            CAPTURE(&ground - grounds, round);
+            const auto along = float(random(0, 6));
+            const glm::vec3 sideways = 1.5f * glm::vec3(std::cos(along), std::sin(along), 0);
+            PlacedShape body{ContactShape(block), {{0, 0, half + 0.1f * voxel * float(random(-1, 1))}}};
+            const auto penetrates = [&](const glm::vec3& displacement) {
+                body.motion.displacement = displacement;
+                const Impact impact = timeOfImpact(body, ground, {.penetration = true});
+                const Impact swapped = timeOfImpact(ground, body, {.penetration = true});
+                CHECK(impact.found == swapped.found);
+                CHECK(impact.fraction == swapped.fraction);
+                if (impact.found) CHECK(impact.distance.normal.z == Approx(1).margin(1e-3));
+                if (swapped.found) CHECK(swapped.distance.normal.z == Approx(-1).margin(1e-3));
+                return impact;
+            };
+            CHECK_FALSE(penetrates(sideways).found);
+            CHECK_FALSE(penetrates(sideways + glm::vec3(0, 0, 1)).found);
+            body.pose.position.z = 2;
+            const glm::vec3 down(0, 0, -float(random(3, 500)));
+            const Impact hit = penetrates(sideways + down);
+            REQUIRE(hit.found);
+            CHECK(std::abs(hit.poseA.position.z - half) < 0.6f * voxel);
+            CHECK(std::abs(hit.distance.b.position.z) < 0.05f * voxel);
+            CHECK_FALSE(penetrates(-down).found);
+        }
+    // a touch is at the start of all of these
+    PlacedShape body{ContactShape(block), {{0, 0, half}}};
+    body.motion.displacement = {1, 0, 0};
+    CHECK(timeOfImpact(body, grounds[0]).fraction == 0);
+    // two shapes without a field
+    CHECK_THROWS_AS(timeOfImpact(grounds[1], grounds[2], {.penetration = true}), std::invalid_argument);
+}

@@ -100,6 +100,21 @@ TriangleCorners degenerate(Random& random, int kind) {
     return {a, b, a + 0.375 * (b - a)};
 }
 
+// A triangle on a coarse lattice, to the bit in one plane with others of the same plane.
+TriangleCorners onLattice(Random& random, double height) {
+    const auto corner = [&] {
+        return glm::dvec3(std::round(random(-4, 4)) / 4, std::round(random(-4, 4)) / 4, height);
+    };
+    return {corner(), corner(), corner()};
+}
+
+// A triangle with one corner next to the opposite edge, or two corners next to each other.
+TriangleCorners sliver(Random& random, double width) {
+    const glm::dvec3 a = pointOf(random), b = pointOf(random);
+    const double part = random(0, 1) < 0.5 ? 1 : random(0, 1);
+    return {a, b, a + part * (b - a) + width * pointOf(random)};
+}
+
 void checkPoints(const TrianglePair& pair, const TriangleCorners& a, const TriangleCorners& b) {
     const glm::dvec3 between = pair.a.position - pair.b.position;
     REQUIRE(std::abs(glm::dot(between, between) - pair.distance2) <= rounding);
@@ -164,6 +179,33 @@ TEST_CASE("Edges that are parallel, or off by any small angle, have the distance
         const glm::dvec3 shift = pointOf(random);
         others.push_back({one[0] + shift, one[1] + shift, one[2] + shift});
         check(one, others);
+    }
+}
+
+TEST_CASE("Triangles in one plane, or in parallel ones, have the distance of brute force") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    Random random(start);
+    for (int round = 0; round < 300; ++round) {
+        std::vector<TriangleCorners> others;
+        for (int i = 0; i < 13; ++i) others.push_back(onLattice(random, i % 2 == 0 ? 0 : 0.25));
+        check(onLattice(random, 0), others);
+    }
+}
+
+TEST_CASE("Slivers of any width have the distance of brute force") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    Random random(start);
+    for (int round = 0; round < 300; ++round) {
+        std::vector<TriangleCorners> others;
+        for (const double width : {1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 1e-16}) {
+            others.push_back(sliver(random, width));
+            const glm::dvec3 toOther = 0.5 * pointOf(random);
+            others.push_back({others.back()[0] + toOther, others.back()[1] + toOther, others.back()[2] - toOther});
+        }
+        check(anyTriangle(random), others);
+        check(sliver(random, std::pow(10, random(-16, -2))), others);
     }
 }
 

@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <iostream>
+#include <limits>
 
 namespace bilayer::test {
 namespace {
@@ -57,19 +58,21 @@ unsigned seed() {
 }
 
 double squaredDistance(const glm::dvec3& point, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
-    // inside the triangle's prism the plane is nearest, elsewhere one of the three edges is
+    // inside the triangle's prism the plane is nearest, elsewhere one of the three edges is; the normal of a sliver is
+    // rounding, and its edges are the better answer
     const glm::dvec3 normal = glm::cross(b - a, c - a);
     const double area2 = glm::dot(normal, normal);
+    double ofPlane = std::numeric_limits<double>::infinity();
     if (area2 > 0) {
         const bool ab = glm::dot(glm::cross(b - a, point - a), normal) >= 0;
         const bool bc = glm::dot(glm::cross(c - b, point - b), normal) >= 0;
         const bool ca = glm::dot(glm::cross(a - c, point - c), normal) >= 0;
         if (ab && bc && ca) {
             const double height = glm::dot(point - a, normal);
-            return height * height / area2;
+            ofPlane = height * height / area2;
         }
     }
-    return std::min({squaredDistanceToSegment(point, a, b), squaredDistanceToSegment(point, b, c),
+    return std::min({ofPlane, squaredDistanceToSegment(point, a, b), squaredDistanceToSegment(point, b, c),
                      squaredDistanceToSegment(point, c, a)});
 }
 

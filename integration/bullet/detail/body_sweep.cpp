@@ -4,8 +4,10 @@
 #include <BulletCollision/CollisionShapes/btCollisionShape.h>
 #include <LinearMath/btTransformUtil.h>
 
-#include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+
+#include "integration/bullet/detail/convert.h"
 
 namespace bilayer::bullet::detail {
 
@@ -21,51 +23,51 @@ float boundingRadius(const btCollisionObject& object) {
     return centre.length() + radius;
 }
 
-BodySweep::BodySweep(btCollisionObject& object, float seconds)
-    : object_(object), end_(object.getWorldTransform()), start_(end_.getOrigin()), orientation_(end_.getRotation()) {
-    body_ = activeDynamicBody(object);
-    // a body that Bullet's own CCD has stopped keeps its velocity, but its displacement is unknown
-    if (!body_ || body_->getHitFraction() < 1) return;
-    displacement_ = seconds * body_->getLinearVelocity();
-    start_ -= displacement_;
-    const btVector3& spin = body_->getAngularVelocity();
+namespace {
+
+/// The motion of a body in the step that has ended. A body that Bullet's own CCD has stopped keeps its velocity, but
+/// its displacement is unknown.
+Motion motionOf(const btRigidBody* body, float seconds) {
+    if (!body || body->getHitFraction() < 1) return {};
+    const glm::vec3 displacement = toGlm(seconds * body->getLinearVelocity());
+    const btVector3& spin = body->getAngularVelocity();
     const float angle = seconds * spin.length();
-    if (!(angle > 0)) return;
-    axis_ = spin.normalized();
+    if (!(angle > 0)) return {displacement};
     // beyond its limit, Bullet rotates by another angle than that of the angular velocity, but about the same axis
     const float maxAngle = ANGULAR_MOTION_THRESHOLD;
-    angle_ = angle > maxAngle ? 2 * std::atan(angle / maxAngle * std::tan(maxAngle / 2)) : angle;
+    const float rotated = angle > maxAngle ? 2 * std::atan(angle / maxAngle * std::tan(maxAngle / 2)) : angle;
+    return {displacement, toGlm(rotated * spin.normalized())};
 }
 
-btTransform BodySweep::at(float time) const {
-    if (!body_ || std::min(time, stopTime_) >= 1) return end_;
-    const float elapsed = std::min(time, stopTime_), left = 1 - elapsed;
-    const btTransform back(btQuaternion(axis_, -left * angle_));
-    return btTransform((back.getRotation() * orientation_).normalized(), start_ + elapsed * displacement_);
-}
+}  // namespace
+
+BodySweep::BodySweep(btCollisionObject& object, float seconds)
+    : object_(object),
+      body_(activeDynamicBody(object)),
+      sweep_(Sweep::endingAt(toPose(object.getWorldTransform()), motionOf(body_, seconds))) {}
 
 float BodySweep::maxDisplacement(const BodySweep& other) const {
-    return (displacement_ - other.displacement_).length() + radius() * angle_ + other.radius() * other.angle_;
+    return float(
+        maxApproach(sweep_, double(boundingRadius(object_)), other.sweep_, double(boundingRadius(other.object_))));
 }
 
 void BodySweep::box(btVector3& lower, btVector3& upper) const {
-    const float r = radius();
-    lower = upper = start_;
-    lower.setMin(start_ + displacement_);
-    upper.setMax(start_ + displacement_);
-    lower -= btVector3(r, r, r);
-    upper += btVector3(r, r, r);
+    const float r = boundingRadius(object_);
+    const glm::vec3 from(sweep_.start()), to(sweep_.start() + sweep_.displacement());
+    lower = toBullet(glm::min(from, to) - r);
+    upper = toBullet(glm::max(from, to) + r);
 }
 
 bool BodySweep::stopAt(float time) {
-    if (!body_ || time >= stopTime_) return false;
-    stopTime_ = time;
+    if (!body_ || time >= stopTime()) return false;
+    sweep_.stopAt(double(time));
     return true;
 }
 
 bool BodySweep::apply() const {
-    if (stopTime_ >= 1) return false;
-    body_->setCenterOfMassTransform(at(stopTime_));
+    if (stopTime() >= 1) return false;
+    const Pose pose = sweep_.at(1);
+    body_->setCenterOfMassTransform(btTransform(toBullet(pose.rotation), toBullet(pose.position)));
     return true;
 }
 

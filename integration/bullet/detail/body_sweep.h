@@ -5,7 +5,11 @@
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
+#include "collider/contact/sweep.h"
+
 namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
 
 /// The object as a body, if it is an active dynamic body of the world; null otherwise.
 btRigidBody* activeDynamicBody(btCollisionObject& object);
@@ -19,15 +23,10 @@ class BodySweep {
     BodySweep(btCollisionObject& object, float seconds);
 
     const btCollisionObject& object() const { return object_; }
-    /// Angle of its rotation [rad].
-    float angle() const { return angle_; }
+    const Sweep& sweep() const { return sweep_; }
 
-    /// Its transform after this fraction of the step [0..1].
-    btTransform at(float time) const;
-
-    float radius() const { return boundingRadius(object_); }
     /// Upper bound of the displacement of its points.
-    float maxDisplacement() const { return displacement_.length() + radius() * angle_; }
+    float maxDisplacement() const { return float(sweep_.maxDisplacement(double(boundingRadius(object_)))); }
     /// Upper bound of the displacement of its points in the frame of another object.
     float maxDisplacement(const BodySweep& other) const;
     /// Bounding box of the whole sweep.
@@ -35,7 +34,7 @@ class BodySweep {
 
     btRigidBody* body() const { return body_; }
     /// The fraction of the step at which it is stopped; 1: not stopped.
-    float stopTime() const { return stopTime_; }
+    float stopTime() const { return float(sweep_.stopTime()); }
     /// Shortens the sweep to this fraction. Returns whether that shortened it.
     bool stopAt(float time);
     /// Moves the body to the pose where it is stopped. Returns whether it is stopped.
@@ -43,11 +42,8 @@ class BodySweep {
 
   private:
     btCollisionObject& object_;
-    btRigidBody* body_ = nullptr;
-    btTransform end_;
-    btVector3 start_, displacement_{0, 0, 0}, axis_{1, 0, 0};
-    btQuaternion orientation_;  ///< at the end
-    float angle_ = 0, stopTime_ = 1;
+    btRigidBody* body_;
+    Sweep sweep_;
 };
 
 }  // namespace bilayer::bullet::detail

@@ -3,6 +3,7 @@
 
 #include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <LinearMath/btAabbUtil2.h>
 #include <tbb/parallel_for_each.h>
 
@@ -15,8 +16,11 @@
 #include <utility>
 #include <vector>
 
+#include <bilayer/integration/bullet/shape.h>
+#include "collider/contact/penetration.h"
+#include "integration/bullet/detail/body_sweep.h"
+#include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/time_of_impact.h"
 
 namespace bilayer::bullet::detail {
 
@@ -30,13 +34,52 @@ constexpr int maxRounds = 256;
 // A body stopped this early in a step counts as not moved.
 constexpr float atStart = 1e-3f;
 
+/// A shape other than a compound, and its pose in its object.
+struct LeafShape {
+    const btCollisionShape* shape;
+    btTransform local;
+
+    const Shape* field() const {
+        return shape->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE ? static_cast<const Shape*>(shape) : nullptr;
+    }
+    /// Whether it takes part in continuous collision. Soft bodies are neither convex nor concave.
+    bool takesPart() const {
+        return shape->getShapeType() != GIMPACT_SHAPE_PROXYTYPE && (shape->isConvex() || shape->isConcave()) &&
+               (!field() || field()->speculative());
+    }
+    /// @param contactShape  contactShapeOf() this shape
+    SweptShape swept(const ContactShape& contactShape, const Sweep& sweep) const {
+        if (!field()) return {contactShape, sweep, toPose(local)};
+        const Placed placed = field()->placed(local);
+        return {contactShape, sweep, placed.pose, placed.scale};
+    }
+};
+
+/// Visits the shapes that take part.
+/// @param found  callback (const LeafShape&)
+template <class Found>
+void visitLeafShapes(const btCollisionShape* shape, const btTransform& local, Found&& found) {
+    if (!shape->isCompound()) {
+        if (const LeafShape leaf{shape, local}; leaf.takesPart()) found(leaf);
+        return;
+    }
+    const auto* compound = static_cast<const btCompoundShape*>(shape);
+    for (int i = 0; i < compound->getNumChildShapes(); ++i)
+        visitLeafShapes(compound->getChildShape(i), local * compound->getChildTransform(i), found);
+}
+
+template <class Found>
+void visitLeafShapes(const btCollisionObject& object, Found&& found) {
+    visitLeafShapes(object.getCollisionShape(), btTransform::getIdentity(), found);
+}
+
 /// Two bodies that may meet in a step; one of them is fast.
 struct SweptPair {
     BodySweep *a, *b;
-    float margin;     ///< two bodies that are not stopped may move by up to this; contacts handle that [m]
-    Impact impact{};  ///< the first impact; normal from b to a
+    float margin;          ///< two bodies that are not stopped may move by up to this; contacts handle that [m]
+    Penetration impact{};  ///< the first one
     float checkedA = -1, checkedB = -1;  ///< the ends of their sweeps when they were last checked
-    Impact stop{};                       ///< where one of them was stopped
+    Penetration stop{};                  ///< where one of them was stopped
 
     /// Whether the pair has not been checked since one of the two was stopped.
     bool needsCheck() const { return a->stopTime() != checkedA || b->stopTime() != checkedB; }
@@ -46,16 +89,18 @@ struct SweptPair {
         checkedA = a->stopTime(), checkedB = b->stopTime();
         if (std::min(checkedA, checkedB) >= 1 && a->maxDisplacement(*b) <= margin) return;
         visitLeafShapes(a->object(), [&](const LeafShape& one) {
+            const ContactShape ofOne = contactShapeOf(*one.shape);
             visitLeafShapes(b->object(), [&](const LeafShape& two) {
-                if (one.field()) impact = earlier(impact, timeOfImpact(one, *a, two, *b));
-                if (two.field()) impact = earlier(impact, timeOfImpact(two, *b, one, *a).reversed());
+                if (!one.field() && !two.field()) return;
+                const ContactShape ofTwo = contactShapeOf(*two.shape);
+                impact = earlier(impact, firstPenetration(one.swept(ofOne, a->sweep()), two.swept(ofTwo, b->sweep())));
             });
         });
     }
 
     /// Stops the body that moves farther. If it is stopped already, stops both, since the other one moves on into it.
     bool stopBody() {
-        if (impact.time >= 1 || needsCheck()) return false;
+        if (!impact.found() || needsCheck()) return false;
         BodySweep *faster = a, *slower = b;
         if (a->maxDisplacement() < b->maxDisplacement()) std::swap(faster, slower);
         const bool wasStopped = faster->stopTime() < 1, isStopped = faster->stopAt(impact.time);
@@ -65,7 +110,7 @@ struct SweptPair {
         return true;
     }
 
-    bool isStopped() const { return stop.time < 1; }
+    bool isStopped() const { return stop.found(); }
     bool hasNotMoved() const { return stop.time <= atStart; }
     StoppedPair stopped() const {
         const auto [first, second] = std::minmax(&a->object(), &b->object());
@@ -83,7 +128,7 @@ struct SweptPair {
 
     /// Removes the approach velocity of the two, as an impact without restitution and friction does.
     void removeApproachVelocity() const {
-        const btVector3 place = toBullet(stop.place), normal = toBullet(stop.normal);
+        const btVector3 place = toBullet(stop.position), normal = toBullet(stop.normal);
         float speed = 0, perMass = 0;
         for (const auto& [sweep, sign] : {std::pair(a, 1.f), std::pair(b, -1.f)})
             if (const btRigidBody* body = sweep->body()) {
@@ -101,8 +146,8 @@ struct SweptPair {
 /// Maximum separation of contacts with an object; nothing without a field.
 std::optional<float> marginOf(const btCollisionObject& object) {
     std::optional<float> margin;
-    visitLeafShapes(object, [&](const LeafShape& shape) {
-        if (const Shape* field = shape.field()) margin = std::max(margin.value_or(0), float(field->getMargin()));
+    visitLeafShapes(object, [&](const LeafShape& leaf) {
+        if (const Shape* field = leaf.field()) margin = std::max(margin.value_or(0), float(field->getMargin()));
     });
     return margin;
 }
@@ -132,7 +177,7 @@ class SweptPairs {
             // earliest first: a stopped body may come no farther
             std::vector<SweptPair*> order;
             for (SweptPair& pair : pairs_)
-                if (pair.impact.time < 1) order.push_back(&pair);
+                if (pair.impact.found()) order.push_back(&pair);
             std::stable_sort(order.begin(), order.end(),
                              [](auto* one, auto* two) { return one->impact.time < two->impact.time; });
             bool isAnyStopped = false;

@@ -114,9 +114,9 @@ btVector3 tangential(const btVector3& v, const btVector3& normal) {
 
 /// Moves a contact that rotates in the step to its predicted position. The drift in between is not slip.
 void applyPrediction(btManifoldPoint& point, const PredictedContact& prediction) {
-    point.m_positionWorldOnA = prediction.onA;
-    point.m_positionWorldOnB = prediction.onB;
-    point.m_normalWorldOnB = prediction.normal;
+    point.m_positionWorldOnA = toBullet(prediction.onA);
+    point.m_positionWorldOnB = toBullet(prediction.onB);
+    point.m_normalWorldOnB = toBullet(prediction.normal);
     point.m_distance1 = prediction.distance;
     point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
 }

@@ -12,19 +12,12 @@
 #include <vector>
 
 #include "collider/contact/contact_reduction.h"
+#include "collider/contact/predicted_contacts.h"
 #include "integration/bullet/detail/triangle_ids.h"
 
 namespace bilayer::bullet::detail {
 
 using namespace bilayer::detail;
-
-/// A predicted contact: the end-of-step contact of rotating bodies. Its coordinates move with the centre of each body.
-/// The distance is the remaining separation without the displacements that the solver accounts for (PredictedContacts).
-struct PredictedContact {
-    btVector3 onA, onB;  ///< contact points on the bodies [m]
-    btVector3 normal;    ///< from B to A
-    float distance;      ///< [m]
-};
 
 /// Data that a manifold gets in addition to the contact itself.
 struct ContactDetails {

@@ -10,9 +10,8 @@
 #include <bilayer/integration/bullet/shape.h>
 #include "collider/contact/edge_probes.h"
 #include "collider/contact/narrow_phase.h"
+#include "collider/contact/predicted_contacts.h"
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/predicted_contacts.h"
-#include "integration/bullet/detail/triangle_sheet.h"
 #include "integration/bullet/detail/velocity.h"
 
 namespace bilayer::bullet::detail {
@@ -43,6 +42,13 @@ Continuity continuityOf(const Side& a, const Side& b) {
     return {.sameWithin = std::min(sameWithin(*a.shape), sameWithin(*b.shape)),
             .restingFriction = std::max(restingFriction(*a.shape), restingFriction(*b.shape)),
             .isSpeculative = isSpeculative(a) && isSpeculative(b)};
+}
+
+SteppedBody steppedBody(const Side& side) {
+    const Velocity velocity = velocityOf(*side.object);
+    SteppedBody body{toGlm(velocity.centre), toGlm(velocity.linear), toGlm(velocity.angular), side.seconds, {}};
+    if (isField(*side.shape)) body.field.emplace(static_cast<const Shape&>(*side.shape).placed(side.transform));
+    return body;
 }
 
 }  // namespace
@@ -116,7 +122,8 @@ void Pair::find(const Side& a, const Side& b, float margin, bool exact) {
     const bool follows = static_cast<const Shape&>(*b.shape).speculative();
     ContactOptions options{.margin = margin, .exact = exact};
     if (!isField(*a.shape)) {
-        report_ = collideOther(a, b.placed(), options, follows ? a.motion() : Motion{});
+        const Motion motion = follows ? a.motion() : Motion{};
+        report_ = collideShape({otherShape(*a.shape), toPose(a.transform), 1, motion}, b.placed(), options, contacts_);
         return;
     }
     // a contact test needs the distance of the bodies for any direction of their normals
@@ -132,7 +139,8 @@ void Pair::finish(const Side& a, const Side& b) {
     reduction_.update(contacts_, toPose(a.transform), toPose(b.transform));
     continuity_ = continuityOf(a, b);
     details_.clear();
-    const PredictedContacts predictions(a, b, continuity_);
+    const SteppedBody bodyA = steppedBody(a), bodyB = steppedBody(b);
+    const PredictedContacts predictions(bodyA, bodyB, continuity_.sameWithin, continuity_.isSpeculative);
     for (const ContactPatch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i)
             details_.push_back({predictions.predict(patch.contacts[i]), std::nullopt});
@@ -155,22 +163,11 @@ void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transfor
     for (std::size_t i = 0; i < details_.size(); ++i) details_[i].triangle = triangles[i];
 }
 
-ContactReport Pair::collideOther(const Side& a, const Placed& field, const ContactOptions& options,
-                                 const Motion& motion) {
-    if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
-        const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
-        const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
-        const float offset = plane.getPlaneConstant() + normal.dot(a.transform.getOrigin());
-        const Motion planeMotion = motion.about(toGlm(a.transform.getOrigin()), glm::vec3(0));
-        return collideHalfSpace({toGlm(normal), offset}, planeMotion, field, options, contacts_);
-    }
-    if (a.shape->isConvex()) {
-        const auto& convex = static_cast<const btConvexShape&>(*a.shape);
-        if (!convex_ || !convex_->represents(convex)) convex_.emplace(convex);
-        return collideConvex(convex_->convex(), toPose(a.transform), motion, field, options, contacts_);
-    }
-    const TriangleSheet sheet = sheetOf(static_cast<const btConcaveShape&>(*a.shape));
-    return collideTriangles(sheet, toPose(a.transform), motion, field, options, contacts_);
+ContactShape Pair::otherShape(const btCollisionShape& shape) {
+    if (!shape.isConvex()) return contactShapeOf(shape);
+    const auto& convex = static_cast<const btConvexShape&>(shape);
+    if (!convex_ || !convex_->represents(convex)) convex_.emplace(convex);
+    return convex_->contactShape();
 }
 
 }  // namespace bilayer::bullet::detail

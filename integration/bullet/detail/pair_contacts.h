@@ -12,7 +12,7 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/dispatcher.h>
-#include "integration/bullet/detail/convex_shape.h"
+#include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/manifolds.h"
 #include "integration/bullet/detail/sampled_pairs.h"
 
@@ -74,13 +74,13 @@ class Pair {
   private:
     float nearest() const;
     void find(const Side& a, const Side& b, float margin, bool exact);
-    ContactReport collideOther(const Side& a, const Placed& field, const ContactOptions& options, const Motion& motion);
+    ContactShape otherShape(const btCollisionShape& shape);
     void finish(const Side& a, const Side& b);
     void nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field);
 
     Manifolds manifolds_;
     DispatchStatistics& statistics_;
-    std::optional<ConvexShape> convex_;  ///< of A
+    std::optional<ConvexShape> convex_;  ///< of A, if it is convex
     ContactCache cache_;                 ///< of two fields
     std::vector<Contact> contacts_;
     ContactReduction reduction_;

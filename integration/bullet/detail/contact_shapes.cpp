@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integration/bullet/detail/convex_shape.h"
+#include "integration/bullet/detail/contact_shapes.h"
 
 #include <BulletCollision/CollisionShapes/btBox2dShape.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
@@ -12,7 +12,9 @@
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 #include <BulletCollision/CollisionShapes/btPolyhedralConvexShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletCollision/CollisionShapes/btStridingMeshInterface.h>
+#include <BulletCollision/CollisionShapes/btTriangleCallback.h>
 #include <LinearMath/btConvexHullComputer.h>
 
 #include <cmath>
@@ -20,6 +22,8 @@
 #include <utility>
 #include <vector>
 
+#include <bilayer/integration/bullet/shape.h>
+#include "collider/contact/shape_data.h"
 #include "integration/bullet/detail/convert.h"
 
 namespace bilayer::bullet::detail {
@@ -111,11 +115,30 @@ Convex cylinderOf(const btCylinderShape& shape) {
 
 Convex spheresOf(const btMultiSphereShape& shape) {
     const btVector3& scaling = shape.getLocalScaling();
-    std::vector<MultisphereHull::Sphere> spheres;
+    std::vector<SphereOfHull> spheres;
     for (int i = 0; i < shape.getSphereCount(); ++i)
         spheres.push_back({toGlm(scaling * shape.getSpherePosition(i)), scaling.x() * shape.getSphereRadius(i)});
     return Convex::spheres(std::move(spheres));
 }
+
+/// Numbers the triangles by part and index. The two triangles of a height field's cell arrive in succession with the
+/// same numbers.
+class Passing : public btTriangleCallback {
+  public:
+    explicit Passing(const TriangleSheet::Visitor& visitor) : visitor_(visitor) {}
+
+    void processTriangle(btVector3* corners, int part, int index) override {
+        const bool isSecond = part == lastPart_ && index == lastIndex_;
+        lastPart_ = isSecond ? -1 : part;
+        lastIndex_ = index;
+        const auto number = (std::uint64_t(std::uint32_t(part)) << 32 | std::uint32_t(index)) << 1;
+        visitor_({toGlm(corners[0]), toGlm(corners[1]), toGlm(corners[2])}, number | std::uint64_t(isSecond));
+    }
+
+  private:
+    const TriangleSheet::Visitor& visitor_;
+    int lastPart_ = -1, lastIndex_ = -1;
+};
 
 }  // namespace
 
@@ -149,13 +172,31 @@ Convex convexOf(const btConvexShape& shape) {
     }
 }
 
+TriangleSheet sheetOf(const btConcaveShape& shape) {
+    return {[&shape](const Bounds& box, const TriangleSheet::Visitor& visitor) {
+        Passing passing(visitor);
+        shape.processAllTriangles(&passing, toBullet(box.lower), toBullet(box.upper));
+    }};
+}
+
+ContactShape contactShapeOf(const btCollisionShape& shape) {
+    const int type = shape.getShapeType();
+    if (type == FAST_CONCAVE_MESH_PROXYTYPE) return ContactShape(static_cast<const Shape&>(shape).collider());
+    if (shape.isConvex()) return ContactShape(ContactShapeData{convexOf(static_cast<const btConvexShape&>(shape))});
+    if (type == STATIC_PLANE_PROXYTYPE) {
+        const auto& plane = static_cast<const btStaticPlaneShape&>(shape);
+        return ContactShape(ContactShapeData{HalfSpace{toGlm(plane.getPlaneNormal()), plane.getPlaneConstant()}});
+    }
+    return ContactShape::triangles(sheetOf(static_cast<const btConcaveShape&>(shape)));
+}
+
 ConvexShape::ConvexShape(const btConvexShape& shape)
     : shape_(&shape),
       scaling_(shape.getLocalScaling()),
       margin_(shape.getMargin()),
       vertexCount_(vertexCountOf(shape)),
       bounds_(boundsOf(shape)),
-      convex_(convexOf(shape)) {}
+      contactShape_(ContactShapeData{convexOf(shape)}) {}
 
 bool ConvexShape::represents(const btConvexShape& shape) const {
     return shape_ == &shape && scaling_ == shape.getLocalScaling() && margin_ == shape.getMargin() &&

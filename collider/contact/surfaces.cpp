@@ -1,30 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integration/bullet/detail/surfaces.h"
-
-#include <BulletCollision/CollisionShapes/btTriangleCallback.h>
+#include "collider/contact/surfaces.h"
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "collider/contact/advancement.h"
 #include "collider/contact/surface_query.h"
 #include "collider/field/interpolant.h"
-#include "integration/bullet/detail/convert.h"
 
-namespace bilayer::bullet::detail {
-
-using namespace bilayer::detail;
+namespace bilayer::detail {
 
 namespace {
 
-constexpr float minStride = 0.05f;  // minimum stride through samples [voxels]
+constexpr float minStride = 0.05f;       // minimum stride through samples [voxels]
+constexpr float nearDistance = 0.5f;     // a path is certainly free while nothing is closer than this [voxels]
+constexpr float entryTolerance = 0.01f;  // a point this close to a convex body has entered it [voxels]
 constexpr float everywhere = std::numeric_limits<float>::max();
 
 }  // namespace
-
-float FieldSurface::bound(const glm::vec3& point) const {
-    return field_.distance(point) - maxInterpolationError * field_.voxelSize();
-}
 
 std::optional<SurfaceEntry> FieldSurface::entry(const glm::vec3& from, const glm::vec3& to, float radius) const {
     if (from == to) return overlaps(from, radius) ? std::optional(SurfaceEntry{from, glm::vec3(0)}) : std::nullopt;
@@ -50,6 +44,12 @@ std::optional<glm::vec3> FieldSurface::depenetration(const glm::vec3& point, flo
     return -sample.distance * normal;
 }
 
+bool FieldSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+    const float reach = radius + maxInterpolationError * field_.voxelSize();
+    return !staysClear(from, to, nearDistance * voxel_,
+                       [&](const glm::vec3& at) { return field_.distance(at) - reach; });
+}
+
 // Whether a path stays outside, by strides through the samples. Many times as fast as the search for the entry.
 bool FieldSurface::staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
     const float voxel = field_.voxelSize(), error = field_.mesh() ? maxInterpolationError * voxel : 0;
@@ -64,12 +64,8 @@ bool FieldSurface::overlaps(const glm::vec3& point, float radius) const {
     return radius > 0 ? field_.overlapsSphere(point, radius) : field_.distance(point) <= 0;
 }
 
-float ConvexSurface::bound(const glm::vec3& point) const {
-    return convex_.nearest(point, everywhere).distance;
-}
-
 std::optional<SurfaceEntry> ConvexSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
-    const auto entry = convex_.castPoint(from, to - from, tolerance_);
+    const auto entry = convex_.castPoint(from, to - from, entryTolerance * voxel_);
     if (!entry) return std::nullopt;
     const glm::vec3 at = from + entry->fraction * (to - from);
     return SurfaceEntry{at - entry->nearest.distance * entry->nearest.normal, entry->nearest.normal};
@@ -80,58 +76,53 @@ std::optional<glm::vec3> ConvexSurface::depenetration(const glm::vec3& point, fl
     return -nearest.distance * nearest.normal;
 }
 
-PlaneSurface::PlaneSurface(const btStaticPlaneShape& shape)
-    : normal_(toGlm(shape.getPlaneNormal())), offset_(shape.getPlaneConstant()) {}
+bool ConvexSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+    return !staysClear(from, to, nearDistance * voxel_,
+                       [&](const glm::vec3& at) { return convex_.nearest(at, everywhere).distance - radius; });
+}
 
-float PlaneSurface::bound(const glm::vec3& point) const {
-    return glm::dot(normal_, point) - offset_;
+float PlaneSurface::heightOf(const glm::vec3& point) const {
+    return glm::dot(solid_.normal, point) - solid_.offset;
 }
 
 std::optional<SurfaceEntry> PlaneSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
-    const float before = bound(from), after = bound(to);
+    const float before = heightOf(from), after = heightOf(to);
     if (before > 0 && after > 0) return std::nullopt;
     const float part = before > 0 ? before / (before - after) : 0;
-    return SurfaceEntry{from + part * (to - from), normal_};
+    return SurfaceEntry{from + part * (to - from), solid_.normal};
 }
 
 std::optional<glm::vec3> PlaneSurface::depenetration(const glm::vec3& point, float) const {
-    return -bound(point) * normal_;
+    return -heightOf(point) * solid_.normal;
 }
 
-std::optional<SurfaceEntry> TriangleSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
-    struct First : btTriangleCallback {
-        glm::vec3 from, displacement;
-        float part = 1;
-        std::optional<SurfaceEntry> entry;
-
-        void processTriangle(btVector3* corners, int, int) override {
-            const glm::vec3 a = toGlm(corners[0]), one = toGlm(corners[1]) - a, two = toGlm(corners[2]) - a;
-            const glm::vec3 normal = glm::cross(one, two), start = from - a, moment = glm::cross(start, displacement);
-            const float along = -glm::dot(displacement, normal);
-            if (along == 0) return;
-            const float s = glm::dot(start, normal) / along, u = glm::dot(two, moment) / along,
-                        v = -glm::dot(one, moment) / along;
-            if (!(s >= 0 && s < part && u >= 0 && v >= 0 && u + v <= 1)) return;
-            part = s;
-            entry = SurfaceEntry{from + s * displacement, (along > 0 ? 1.f : -1.f) * glm::normalize(normal)};
-        }
-    } first;
-    first.from = from, first.displacement = to - from;
-    visit(glm::min(from, to), glm::max(from, to), first);
-    return first.entry;
+bool PlaneSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+    return std::min(heightOf(from), heightOf(to)) - radius < nearDistance * voxel_;
 }
 
-bool TriangleSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
-    struct Any : btTriangleCallback {
-        bool found = false;
-        void processTriangle(btVector3*, int, int) override { found = true; }
-    } any;
-    visit(glm::min(from, to) - radius, glm::max(from, to) + radius, any);
-    return any.found;
+std::optional<SurfaceEntry> SheetSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+    const glm::vec3 displacement = to - from;
+    float part = 1;
+    std::optional<SurfaceEntry> first;
+    sheet_.visit({glm::min(from, to), glm::max(from, to)}, [&](const Triangle& triangle, std::uint64_t) {
+        const glm::vec3 &a = triangle[0], one = triangle[1] - a, two = triangle[2] - a;
+        const glm::vec3 normal = glm::cross(one, two), start = from - a, moment = glm::cross(start, displacement);
+        const float along = -glm::dot(displacement, normal);
+        if (along == 0) return;
+        const float s = glm::dot(start, normal) / along, u = glm::dot(two, moment) / along,
+                    v = -glm::dot(one, moment) / along;
+        if (!(s >= 0 && s < part && u >= 0 && v >= 0 && u + v <= 1)) return;
+        part = s;
+        first = SurfaceEntry{from + s * displacement, (along > 0 ? 1.f : -1.f) * glm::normalize(normal)};
+    });
+    return first;
 }
 
-void TriangleSurface::visit(const glm::vec3& lower, const glm::vec3& upper, btTriangleCallback& callback) const {
-    mesh_.processAllTriangles(&callback, toBullet(lower), toBullet(upper));
+bool SheetSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+    bool found = false;
+    sheet_.visit({glm::min(from, to) - radius, glm::max(from, to) + radius},
+                 [&](const Triangle&, std::uint64_t) { found = true; });
+    return found;
 }
 
-}  // namespace bilayer::bullet::detail
+}  // namespace bilayer::detail

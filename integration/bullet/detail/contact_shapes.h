@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bullet's convex shapes as convex bodies in closed form.
-// Tested by tests/bullet/convex.cpp.
+// Bullet's shapes as contact shapes.
+// Tested by tests/bullet/convex.cpp and tests/bullet/open_surface.cpp.
 #pragma once
 
+#include <BulletCollision/CollisionShapes/btConcaveShape.h>
 #include <BulletCollision/CollisionShapes/btConvexShape.h>
 
 #include <array>
 
+#include <bilayer/collider/shapes.h>
 #include "collider/contact/convex.h"
 
 namespace bilayer::bullet::detail {
@@ -18,12 +20,20 @@ using namespace bilayer::detail;
 /// hulls of their (support) points, grown by Bullet's margin as everywhere in Bullet.
 Convex convexOf(const btConvexShape& shape);
 
-/// The convex body of a shape that may change.
+/// The triangles of a mesh or a height field.
+/// @param shape  must outlive the sheet
+TriangleSheet sheetOf(const btConcaveShape& shape);
+
+/// A shape other than a compound, without its pose. A field's pose and scale are those of Shape::placed().
+/// @param shape  must outlive the contact shape, if it has triangles
+ContactShape contactShapeOf(const btCollisionShape& shape);
+
+/// The contact shape of a convex shape that may change.
 class ConvexShape {
   public:
     explicit ConvexShape(const btConvexShape& shape);
 
-    const Convex& convex() const { return convex_; }
+    const ContactShape& contactShape() const { return contactShape_; }
     /// Whether this object represents the shape. False for another shape, and after the shape has changed its scaling,
     /// size, margin or number of points.
     bool represents(const btConvexShape& shape) const;
@@ -34,7 +44,7 @@ class ConvexShape {
     float margin_;
     int vertexCount_;
     std::array<btVector3, 2> bounds_;
-    Convex convex_;
+    ContactShape contactShape_;
 };
 
 }  // namespace bilayer::bullet::detail

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "collider/contact/penetration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <optional>
+#include <type_traits>
+#include <variant>
+#include <vector>
+
+#include "collider/contact/body_transform.h"
+#include "collider/contact/collider_data.h"
+#include "collider/contact/edge_probes.h"
+#include "collider/contact/open_surface.h"
+#include "collider/contact/shape_data.h"
+#include "collider/contact/surfaces.h"
+
+namespace bilayer::detail {
+
+namespace {
+
+// Depth of the test points inside their own body [voxels]. Contacts handle shallower penetration, so that a body that
+// slides along another one is not stopped.
+constexpr float testDepth = 0.25f;
+// Maximum depth of such a point below the plane at its entry, or beyond its initial depth [voxels].
+constexpr float allowedDepth = 0.1f;
+// A stopped body goes back by this much at most from where the test point entered [voxels]. An oblique path touches far
+// before it enters. Where the surface bends in between, the next step's contacts would not see what the body met, and
+// stop it in the same place again.
+constexpr float maxReturn = 0.5f;
+// Arcs are approximated by chords of this angle [rad]; their error is its square over eight, in fractions of the
+// radius.
+constexpr float maxChordAngle = 0.1f;
+constexpr int maxProbes = 1 << 20;     // along an edge; distant ones are skipped
+constexpr float arcOverChord = 1.12f;  // length of an arc of a rim over its chord, up to a quarter of the rim
+
+/// Transforms coordinates of the points' shape into those of the surface at some time of the step.
+struct StepTransform : BodyTransform {
+    float time;
+};
+
+/// Moments from start to end, so close together that the paths between them are straight.
+std::vector<StepTransform> stepTransforms(const SweptShape& points, const SweptShape& surface) {
+    const int chords = std::max(1, int(std::ceil(float(points.sweep.angle() + surface.sweep.angle()) / maxChordAngle)));
+    std::vector<float> times{float(points.sweep.stopTime()), float(surface.sweep.stopTime())};
+    for (int i = 0; i <= chords; ++i) times.push_back(float(i) / float(chords));
+    std::sort(times.begin(), times.end());
+    times.erase(std::unique(times.begin(), times.end()), times.end());
+    std::vector<StepTransform> transforms;
+    for (const float time : times) {
+        const Pose from = points.at(double(time)), into = surface.at(double(time));
+        transforms.push_back({BodyTransform(from, points.scale, into, surface.scale), time});
+    }
+    return transforms;
+}
+
+/// A point of a body, grown by a radius.
+struct RoundedPoint {
+    glm::vec3 place;
+    glm::vec3 outward;  ///< outward normal of the body, of unit length; or zero
+    float radius = 0;
+};
+
+/// Follows points on their paths through a surface.
+template <class Surface>
+class PointSweep {
+  public:
+    /// @param voxel  in the surface's units
+    PointSweep(const Surface& surface, const std::vector<StepTransform>& transforms, float voxel)
+        : surface_(surface), transforms_(transforms), voxel_(voxel), scale_(transforms.front().scale) {}
+
+    /// Follows the surface points of a collider.
+    void follow(const SurfacePoints& points) {
+        const auto reject = [&](const glm::vec3& centre, float radius) { return !comesNear(centre, scale_ * radius); };
+        points.visit(reject, [&](std::uint32_t, const SurfacePoint& point) { follow({point.position, point.normal}); });
+    }
+
+    /// Follows the vertices and edges of a convex body, grown by its radius.
+    /// @param voxel  in the units of the body
+    void follow(const Convex& convex, float voxel) {
+        const auto pointAt = [](const glm::vec3& point, float radius) {
+            const float length = glm::length(point);
+            return RoundedPoint{point, length > 0 ? point / length : glm::vec3(0), radius};
+        };
+        const auto vertices = convex.vertices();
+        for (std::uint32_t i = 0; i < vertices.size(); ++i) follow(pointAt(vertices[i], convex.radius(i)));
+        for (const Convex::Edge& edge : convex.edges())
+            followEdge(glm::distance(vertices[edge.from], vertices[edge.to]), voxel, [&](float fraction) {
+                return pointAt(convex.place(edge, fraction), convex.radius(edge, fraction));
+            });
+    }
+
+    /// Follows the sharp features of triangles.
+    void follow(const SharpFeatures& sharp, float voxel) {
+        for (const SharpFeatures::OutwardVertex& vertex : sharp.vertices) follow({vertex.place, vertex.outward});
+        for (const SharpFeatures::OutwardEdge& edge : sharp.edges)
+            followEdge(glm::distance(edge.from, edge.to), voxel, [&](float fraction) {
+                return RoundedPoint{glm::mix(edge.from, edge.to, fraction), edge.outward};
+            });
+    }
+
+    /// The first penetration, in the surface's coordinates.
+    const Penetration& first() const { return first_; }
+
+  private:
+    void follow(const RoundedPoint& rounded) {
+        const auto& [point, outward, radius] = rounded;
+        const float inward = testDepth * voxel_, smaller = std::max(scale_ * radius - inward, 0.f);
+        const glm::vec3 inner = point - (inward - scale_ * radius + smaller) / scale_ * outward;
+        glm::vec3 from = transforms_.front()(inner), offset(0);
+        // a point that starts inside may move on at its depth
+        if (surface_.entry(from, from, smaller)) {
+            const auto out = surface_.depenetration(from, smaller);
+            if (!out) return;
+            offset = *out;
+        }
+        from += offset;
+        std::optional<SurfaceEntry> entered;
+        for (std::size_t i = 0; i + 1 < transforms_.size() && transforms_[i].time < first_.time; ++i) {
+            const glm::vec3 to = transforms_[i + 1](inner) + offset;
+            if (!entered) entered = surface_.entry(from, to, smaller);
+            if (entered) {
+                const auto depth = [&](const glm::vec3& at) {
+                    return glm::dot(entered->position - at, entered->normal) + smaller;
+                };
+                const float before = depth(from), after = depth(to), deepest = allowedDepth * voxel_;
+                if (after > deepest) {
+                    // back to the contact of its own surface
+                    const glm::vec3 out = transforms_[i].rotated(outward);
+                    const float touching = std::min(inward * glm::dot(out, entered->normal), 0.f);
+                    const float descent = after - before, back = maxReturn * voxel_ / glm::distance(from, to);
+                    const float part = std::max(touching - before, -before - back * descent) / descent;
+                    const float time = transforms_[i].time + part * (transforms_[i + 1].time - transforms_[i].time);
+                    first_ = {std::clamp(time, 0.f, first_.time), entered->position - offset, entered->normal};
+                    return;
+                }
+                if (after < 0) entered.reset();
+            }
+            from = to;
+        }
+    }
+
+    /// Follows the points of an edge, ends excluded.
+    /// @param length   between its ends
+    /// @param voxel    of the field that is met, in the same units
+    /// @param pointAt  (float fraction) -> RoundedPoint
+    template <class PointAt>
+    void followEdge(float length, float voxel, const PointAt& pointAt) {
+        const int intervals = probeIntervals(length, voxel, maxProbes);
+        const float radius = std::max(pointAt(0.f).radius, pointAt(1.f).radius);
+        followBetween(0, intervals, arcOverChord * length / float(intervals), radius,
+                      [&](int i) { return pointAt(float(i) / float(intervals)); });
+    }
+
+    /// Follows the points with numbers in between, if any of them may come near.
+    /// @param length, radius  from one point to the next, and of the largest point
+    template <class PointAt>
+    void followBetween(int from, int to, float length, float radius, const PointAt& pointAt) {
+        if (to - from < 2) return;
+        const int middle = from + (to - from) / 2;
+        const RoundedPoint rounded = pointAt(middle);
+        if (!comesNear(rounded.place, scale_ * (float(to - middle) * length + radius))) return;
+        follow(rounded);
+        followBetween(from, middle, length, radius, pointAt);
+        followBetween(middle, to, length, radius, pointAt);
+    }
+
+    bool comesNear(const glm::vec3& centre, float radius) const {
+        for (std::size_t i = 0; i + 1 < transforms_.size() && transforms_[i].time < first_.time; ++i)
+            if (surface_.isNear(transforms_[i](centre), transforms_[i + 1](centre), radius)) return true;
+        return false;
+    }
+
+    const Surface& surface_;
+    const std::vector<StepTransform>& transforms_;
+    float voxel_, scale_;
+    Penetration first_;
+};
+
+/// The edge of a shape's voxel [m]; infinite if it has none.
+float voxelOf(const SweptShape& body) {
+    const Collider* collider = body.shape.collider();
+    return collider ? body.scale * collider->field().voxelSize() : std::numeric_limits<float>::infinity();
+}
+
+/// The sharp features of a sheet's triangles that a collider may meet.
+SharpFeatures sharpFeaturesOn(const TriangleSheet& sheet, float scale, const SweptShape& field,
+                              const std::vector<StepTransform>& intoSheet) {
+    const Bounds& bounds = field.shape.collider()->bounds();
+    std::vector<glm::vec3> path;
+    for (const StepTransform& transform : intoSheet) path.push_back(transform(bounds.centre()));
+    const float radius = 0.5f * field.scale / scale * glm::length(bounds.size());
+    return sharpFeaturesOf(trianglesAlong(sheet, path, radius));
+}
+
+/// The first penetration of the points of one shape into the surface of another, in world coordinates.
+/// @param voxel  the smaller one of both [m]
+Penetration firstOf(const SweptShape& points, const SweptShape& other, float voxel) {
+    const std::vector<StepTransform> transforms = stepTransforms(points, other);
+    const auto& shape = points.shape.data().shape;
+    const auto into = [&](const auto& solid) {
+        const auto surface = surfaceOf(solid, voxel / other.scale);
+        PointSweep sweep(surface, transforms, voxel / other.scale);
+        const float ownVoxel = voxel / points.scale;
+        if (const auto* collider = std::get_if<Collider>(&shape))
+            sweep.follow(collider->data().points());
+        else if constexpr (std::is_same_v<decltype(surface), const FieldSurface>) {
+            if (const auto* convex = std::get_if<Convex>(&shape)) sweep.follow(*convex, ownVoxel);
+            if (const auto* sheet = std::get_if<TriangleSheet>(&shape))
+                sweep.follow(sharpFeaturesOn(*sheet, points.scale, other, stepTransforms(other, points)), ownVoxel);
+        }
+        return sweep.first();
+    };
+    const Penetration first = std::visit(into, other.shape.data().shape);
+    const Pose pose = other.at(double(first.time));
+    return {first.time, pose.toWorld(other.scale * first.position), pose.rotation * first.normal};
+}
+
+}  // namespace
+
+Penetration firstPenetration(const SweptShape& a, const SweptShape& b) {
+    const float voxel = std::min(voxelOf(a), voxelOf(b));
+    return earlier(firstOf(a, b, voxel), firstOf(b, a, voxel).reversed());
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// The surfaces that points of moving bodies enter, each in its own coordinates and units. All have
+//
+// - std::optional<SurfaceEntry> entry(from, to, radius): where a sphere enters on a straight path; its start if inside;
+// - std::optional<glm::vec3> depenetration(point, radius): the displacement to the surface of a sphere that is inside;
+//   none if unknown;
+// - bool isNear(from, to, radius): whether a sphere may come near on a straight path.
+//
+// Only fields are entered by spheres with a radius, and by points where they are at the start.
+// Tested by tests/collider/time_of_impact.cpp through timeOfImpact().
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <optional>
+
+#include <bilayer/collider/field.h>
+#include "collider/contact/convex.h"
+#include "collider/contact/shape_data.h"
+
+namespace bilayer::detail {
+
+/// Where a path enters a surface.
+struct SurfaceEntry {
+    glm::vec3 position, normal;  ///< the normal points outward and has unit length
+};
+
+class FieldSurface {
+  public:
+    FieldSurface(const Collider& collider, float voxel) : field_(collider.field()), voxel_(voxel) {}
+
+    std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float radius) const;
+    std::optional<glm::vec3> depenetration(const glm::vec3& point, float radius) const;
+    bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const;
+
+  private:
+    bool staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const;
+    bool overlaps(const glm::vec3& point, float radius) const;
+
+    const Field& field_;
+    float voxel_;
+};
+
+class ConvexSurface {
+  public:
+    ConvexSurface(const Convex& convex, float voxel) : convex_(convex), voxel_(voxel) {}
+
+    std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
+    std::optional<glm::vec3> depenetration(const glm::vec3& point, float) const;
+    bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const;
+
+  private:
+    const Convex& convex_;
+    float voxel_;
+};
+
+class PlaneSurface {
+  public:
+    PlaneSurface(const HalfSpace& solid, float voxel) : solid_(solid), voxel_(voxel) {}
+
+    std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
+    std::optional<glm::vec3> depenetration(const glm::vec3& point, float) const;
+    bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const;
+
+  private:
+    float heightOf(const glm::vec3& point) const;
+
+    const HalfSpace& solid_;
+    float voxel_;
+};
+
+/// An open surface, which has no inside.
+class SheetSurface {
+  public:
+    SheetSurface(const TriangleSheet& sheet, float) : sheet_(sheet) {}
+
+    std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
+    std::optional<glm::vec3> depenetration(const glm::vec3&, float) const { return std::nullopt; }
+    bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const;
+
+  private:
+    const TriangleSheet& sheet_;
+};
+
+/// The surface of each kind of shape.
+/// @param voxel  the unit of tolerances, in the surface's own units
+inline FieldSurface surfaceOf(const Collider& shape, float voxel) {
+    return {shape, voxel};
+}
+inline ConvexSurface surfaceOf(const Convex& shape, float voxel) {
+    return {shape, voxel};
+}
+inline PlaneSurface surfaceOf(const HalfSpace& shape, float voxel) {
+    return {shape, voxel};
+}
+inline SheetSurface surfaceOf(const TriangleSheet& shape, float voxel) {
+    return {shape, voxel};
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// The boxes of a tree's group that a ray meets. Highway includes this file once for each instruction set: only between
+// HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
+// Tested by tests/collider/mesh_rays.cpp through firstHit().
+#if defined(BILAYER_SDF_RAY_SLABS_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef BILAYER_SDF_RAY_SLABS_H
+#undef BILAYER_SDF_RAY_SLABS_H
+#else
+#define BILAYER_SDF_RAY_SLABS_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <glm/vec3.hpp>
+
+#include "sdf/bvh/node_stack.h"
+#include "sdf/bvh/tree_lanes.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+namespace {
+
+/// Min speed along an axis; at it, a ray stays between two planes for a billion slacks, which is beyond all boxes.
+constexpr float slowest = 1e-9f;
+/// Tolerance for the rounding of a quotient.
+constexpr float quotientRoundUp = 1 + 1e-6f;
+
+// A ray against boxes: T. Kay, J. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986, 269-278.
+class RaySlabs {
+  public:
+    /// @param slack  margin around boxes for rounding
+    RaySlabs(const glm::vec3& origin, const glm::vec3& direction, float slack) {
+        for (int k = 0; k < 3; ++k) {
+            const bool down = direction[k] < 0;
+            perDirection_[k] = (down ? -1 : 1) / std::max(std::abs(direction[k]), slowest);
+            forward_[k] = !down;
+            nearOrigin_[k] = origin[k] + (down ? -slack : slack);
+            farOrigin_[k] = origin[k] - (down ? -slack : slack);
+        }
+    }
+
+    // Pushes the children of a group that the ray enters within a limit. Their keys are where it does.
+    void pushMet(const BoxGroup& group, float limit, NodeStack& stack) const {
+        const Tag tag;
+        alignas(64) float enters[treeWidth];
+        unsigned met = 0;
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+            Vec enter = hn::Zero(tag), leave = hn::Set(tag, limit);
+            for (int k = 0; k < 3; ++k) {
+                const float* first = forward_[k] ? group.lower[k] : group.upper[k];
+                const float* second = forward_[k] ? group.upper[k] : group.lower[k];
+                const Vec per = hn::Set(tag, perDirection_[k]);
+                enter = hn::Max(enter, hn::Mul(hn::Sub(hn::Load(tag, first + i), hn::Set(tag, nearOrigin_[k])), per));
+                leave = hn::Min(leave, hn::Mul(hn::Sub(hn::Load(tag, second + i), hn::Set(tag, farOrigin_[k])), per));
+            }
+            hn::Store(enter, tag, enters + i);
+            met |= bitsOf(hn::Le(enter, hn::Mul(leave, hn::Set(tag, quotientRoundUp)))) << i;
+        }
+        stack.pushChildren(met, enters, group.firstChild);
+    }
+
+  private:
+    float perDirection_[3], nearOrigin_[3], farOrigin_[3];
+    bool forward_[3];
+};
+
+}  // namespace
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
