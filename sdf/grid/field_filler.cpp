@@ -28,8 +28,8 @@
 namespace bilayer::detail {
 namespace {
 
-/// Fraction of the voxels that may be equally near to both layers by chance. On clean meshes it is below 3e-4.
-constexpr double maxTies = 1e-3;
+/// Fraction of the voxels that may be equally near to both layers by chance. On clean meshes it is below 0.003.
+constexpr double maxTies = 0.02;
 
 // Returns the distances of blocks, negated where another field of the same surface is negative.
 std::vector<float> withSides(const openvdb::FloatGrid& sides, const FilledBlocks& blocks) {
