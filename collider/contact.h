@@ -60,9 +60,9 @@ struct Contact {
     /// How far the predicted motion reduces the distance [m]. Non-zero only if the motion moves some point farther than
     /// the margin.
     float approach = 0;
-    /// Tells how the contact position moves with the body that owns the feature. 0 or positive: the position is fixed
-    /// to a vertex or edge of that body and rotates with it; the value is the feature's rounding radius [m]. Negative:
-    /// the position is the closest point of two surfaces, and remains so while they roll.
+    /// The rounding radius of a vertex or edge that the contact position is fixed to, on the body that owns the feature
+    /// [m]; the position rotates with that body. Negative: the position is the closest point of two surfaces, and
+    /// remains so while they roll.
     float turningRadius = -1;
 
     /// The distance after the predicted motion, if nothing stops it [m].

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bilayer/collider/distance.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -21,16 +23,19 @@ using namespace detail;
 
 namespace {
 
-/// The default tolerance [voxels], and the lower limit of all [sizes of the larger body].
+/// The default tolerance [voxels], and the minimum of any tolerance [sizes of the larger body].
 constexpr double defaultTolerance = 0.05, minTolerance = 1e-5;
 /// A body that rotates by more has no motion of one step [rad].
 constexpr float maxRotation = 1000;
 
 void check(const Motion& motion) {
     if (!isFinite(motion.displacement) || !isFinite(motion.rotation))
-        throw std::invalid_argument("the motion is not finite");
+        throw std::invalid_argument(fmt::format("the motion must be finite, not {}, {}, {} m and {}, {}, {} rad",
+                                                motion.displacement.x, motion.displacement.y, motion.displacement.z,
+                                                motion.rotation.x, motion.rotation.y, motion.rotation.z));
     if (glm::length(glm::dvec3(motion.rotation)) > maxRotation)
-        throw std::invalid_argument("the motion rotates by more than 1000 rad");
+        throw std::invalid_argument(fmt::format("the motion rotates by {:g} rad; at most {:g} are allowed",
+                                                glm::length(motion.rotation), maxRotation));
 }
 
 /// What the search must know of a body.

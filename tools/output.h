@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Output of the commands: tables for people, JSON for programs, a progress bar on a terminal.
+// Tested by tests/tools/build.cpp through run().
 #pragma once
 
 #include <chrono>

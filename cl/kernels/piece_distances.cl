@@ -96,17 +96,17 @@ typedef struct {
     float3 centre, normal;
     float thickness, radius2;
     float px2[SLICES], height[SLICES];
-} Drum;
+} BoundingCylinder;
 
-void makeDrum(Drum* drum, const Share* own, float3 centre, float radius, float3 normal, float thickness) {
-    drum->centre = centre;
-    drum->normal = normal;
-    drum->thickness = thickness + BOUND_SLACK;
-    drum->radius2 = square(radius + BOUND_SLACK);
+void makeCylinder(BoundingCylinder* cylinder, const Share* own, float3 centre, float radius, float3 normal, float thickness) {
+    cylinder->centre = centre;
+    cylinder->normal = normal;
+    cylinder->thickness = thickness + BOUND_SLACK;
+    cylinder->radius2 = square(radius + BOUND_SLACK);
     for (int i = 0; i < SLICES; ++i) {
         const float px = (float)(own->firstSlice + i) - centre.x;
-        drum->px2[i] = px * px;
-        drum->height[i] = px * normal.x;
+        cylinder->px2[i] = px * px;
+        cylinder->height[i] = px * normal.x;
     }
 }
 
@@ -115,33 +115,33 @@ typedef struct {
     Lanes excess, height;
 } Column;
 
-Column makeColumn(const Drum* drum, int column) {
-    const Lanes py = latticeY(column) - drum->centre.y, pz = latticeZ() - drum->centre.z;
-    const Column result = {py * py + pz * pz - drum->radius2, py * drum->normal.y + pz * drum->normal.z};
+Column makeColumn(const BoundingCylinder* cylinder, int column) {
+    const Lanes py = latticeY(column) - cylinder->centre.y, pz = latticeZ() - cylinder->centre.z;
+    const Column result = {py * py + pz * pz - cylinder->radius2, py * cylinder->normal.y + pz * cylinder->normal.z};
     return result;
 }
 
 // Whether the cylinder may be nearest to some voxel of a chunk.
-bool mayBeNearest(const NearestPieces* found, const Drum* drum, const Column* column, int slice, int chunk,
+bool mayBeNearest(const NearestPieces* found, const BoundingCylinder* cylinder, const Column* column, int slice, int chunk,
                   bool thick) {
-    const Lanes bound2 = found->nearest2[chunk], h = drum->height[slice] + column->height;
-    Lanes excess = drum->px2[slice] + column->excess - bound2, g2 = h * h;
+    const Lanes bound2 = found->nearest2[chunk], h = cylinder->height[slice] + column->height;
+    Lanes excess = cylinder->px2[slice] + column->excess - bound2, g2 = h * h;
     if (thick) {
         const Lanes h2 = g2;
-        g2 = squareLanes(max(fabs(h) - drum->thickness, (Lanes)(0.0f)));
+        g2 = squareLanes(max(fabs(h) - cylinder->thickness, (Lanes)(0.0f)));
         excess += g2 - h2;
     }
-    return anyLane(excess * fabs(excess) <= 4 * drum->radius2 * (bound2 - g2 + HEIGHT_SLACK));
+    return anyLane(excess * fabs(excess) <= 4 * cylinder->radius2 * (bound2 - g2 + HEIGHT_SLACK));
 }
 
 // Bits of the chunks in a part of a share with a voxel that the cylinder may be nearest to.
-uint nearChunks(const NearestPieces* found, const Share* own, const Share* part, const Drum* drum, bool thick) {
+uint nearChunks(const NearestPieces* found, const Share* own, const Share* part, const BoundingCylinder* cylinder, bool thick) {
     uint near = 0;
     for (int c = part->firstColumn; c <= part->lastColumn; ++c) {
-        const Column column = makeColumn(drum, c);
+        const Column column = makeColumn(cylinder, c);
         for (int slice = part->firstSlice; slice <= part->lastSlice; ++slice) {
             const int chunk = chunkAt(slice, c);
-            near |= (uint)(mayBeNearest(found, drum, &column, slice - own->firstSlice, chunk, thick)) << chunk;
+            near |= (uint)(mayBeNearest(found, cylinder, &column, slice - own->firstSlice, chunk, thick)) << chunk;
         }
     }
     return near;
@@ -157,15 +157,15 @@ int sliceOf(int chunk) {
 }
 
 // The same for a disc, out of some chunks.
-uint nearChunksAmong(const NearestPieces* found, const Share* own, uint among, const Drum* drum) {
+uint nearChunksAmong(const NearestPieces* found, const Share* own, uint among, const BoundingCylinder* cylinder) {
     uint near = 0;
     for (int c = own->firstColumn; c <= own->lastColumn; ++c) {
         uint chunks = chunksOfColumn(among, c);
         if (chunks == 0) continue;
-        const Column column = makeColumn(drum, c);
+        const Column column = makeColumn(cylinder, c);
         for (; chunks != 0; chunks &= chunks - 1) {
             const int chunk = lowestBit(chunks);
-            near |= (uint)(mayBeNearest(found, drum, &column, sliceOf(chunk), chunk, false)) << chunk;
+            near |= (uint)(mayBeNearest(found, cylinder, &column, sliceOf(chunk), chunk, false)) << chunk;
         }
     }
     return near;
@@ -250,10 +250,10 @@ void applyMembers(const Input* input, const Share* own, uint cluster, uint chunk
         global const Member* member = input->members + m;
         uint nearby = chunks;
         if (end - begin > 1) {
-            Drum drum;
-            makeDrum(&drum, own, vload3(0, member->position) - input->nearby.inBrick, member->radius,
+            BoundingCylinder cylinder;
+            makeCylinder(&cylinder, own, vload3(0, member->position) - input->nearby.inBrick, member->radius,
                      vload3(0, member->normal), 0);
-            nearby = nearChunksAmong(found, own, chunks, &drum);
+            nearby = nearChunksAmong(found, own, chunks, &cylinder);
         }
         if (nearby != 0)
             applyPiece(found, own, nearby, input->pieces + member->content, member->content, input->nearby.block);
@@ -267,12 +267,12 @@ void applyGroups(const Input* input, const Share* own, SHARED const uint* page, 
         global const float* columns = input->nearby.groups.columns + c;
         const float3 sample = positionOf(&input->nearby.groups, c) - input->nearby.inBrick;
         const float radius = columns[RADIUS * stride], thickness = columns[THICKNESS * stride];
-        Drum drum;
-        makeDrum(&drum, own, sample, radius,
+        BoundingCylinder cylinder;
+        makeCylinder(&cylinder, own, sample, radius,
                  (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]),
                  thickness);
         const Share part = overlap(own, sample, input->nearby.reach + radius);
-        const uint near = nearChunks(found, own, &part, &drum, thickness > 0);
+        const uint near = nearChunks(found, own, &part, &cylinder, thickness > 0);
         if (near != 0) applyMembers(input, own, c, near, found);
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples points of bodies in the fields of other bodies. Does the same operations as collider/collider.cpp. A bounding
+// Samples points of bodies in the fields of other bodies. Does the same operations as collider/contact/points_in_field.h. A bounding
 // sphere of points that is certainly far from the other body is culled.
 #include "field.cl"
 

@@ -91,8 +91,8 @@ bool ContactReduction::holds(const Pose& a, const Pose& b) const {
     return reduced_.slack > 0 && std::all_of(kept_.begin(), kept_.end(), hasHardlyMoved);
 }
 
-/// Whether all chosen contacts exist again, no contact approaches from afar, and a press meets no other contact earlier
-/// than these by more than its tolerance.
+/// Whether all chosen contacts exist again, no contact is predicted, and no other contact is deeper than these by more
+/// than pressTolerance.
 bool ContactReduction::reuse(const std::vector<Contact>& contacts) {
     std::vector<const Contact*> found(kept_.size(), nullptr);
     float deepest = std::numeric_limits<float>::max(), deepestFound = deepest;

@@ -24,7 +24,7 @@ bool FaceHeight::isExact(std::uint32_t index, const glm::vec3& normal, float hei
                          const LocalField::FieldSample& foot) const {
     const Collider& collider = field_.placed.collider;
     const SurfacePoint& point = collider.data().points().points()[index];
-    // where the foot is in the middle of its body, the side counts that a point of a face points to
+    // a foot on the medial axis has no normal: then the normal of the face point tells the side
     const bool isUnclear = foot.where == LocalField::FieldSample::noNormal && !point.isSharp;
     const float facing = glm::dot(foot.normal, normal), required = point.isSharp ? minFacing : 0;
     const bool isNearSide =

@@ -36,9 +36,9 @@ class FaceHeight {
     /// @param foot    the field at the foot
     bool isExact(std::uint32_t index, const glm::vec3& normal, float height, const LocalField::FieldSample& foot) const;
 
-    /// Whether the field's surface with this normal at a place bends to another normal within the spacing of its
-    /// points, at present or during the rotation in the step. If not, it continues deeper, and touches elsewhere: at
-    /// the bend, or at the border of the face.
+    /// Whether the field's surface at a place has an edge within the spacing of its points: beyond it, the normal is
+    /// another one, at present or during the rotation in the step. Without an edge the surface continues deeper, and
+    /// touches elsewhere: at a farther edge, or at the border of the face.
     bool bendsTo(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const;
 
     bool isConvexVertex(std::uint32_t index, const glm::vec3& normal) const;
@@ -47,8 +47,8 @@ class FaceHeight {
     static float distanceAlongAxis(const SurfacePoint& vertex, const glm::vec3& normal, float height);
 
     /// Whether a convex vertex under a face has penetrated it: its body continues behind the face. If the vertex is
-    /// deeper than a voxel, also no far side of the body is near, its axis meets the triangles, and no other triangle
-    /// is nearer to it.
+    /// deeper than a voxel, three more conditions hold: the opposite wall of the body is farther away, the vertex's
+    /// axis meets the triangles, and no other triangle is nearer to the vertex.
     /// @param distance  along its axis to the triangles
     bool hasPenetrated(const SurfacePoint& vertex, const glm::vec3& normal, float height, float distance) const;
 

@@ -50,8 +50,8 @@ void addTilts(float tilt, std::vector<Perturbation>& all) {
     for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * directionAt(float(k) / tiltDirections)});
 }
 
-/// The motions that contacts are kept for, in the order of the choice: those that span the patch first, a mere press
-/// last.
+/// The motions that contacts are kept for, in the order of the choice: those that span the patch first, the motion
+/// along the normal alone last.
 std::vector<Perturbation> perturbations() {
     std::vector<Perturbation> all;
     for (const float tilt : tilts) addTilts(tilt, all);

@@ -16,8 +16,9 @@ namespace bilayer::detail {
 /// this need not be kept, and contacts of the last step are kept again. Otherwise rounding would decide which of
 /// several comes first, and bodies would jitter with each change.
 inline constexpr float reductionTolerance = 1e-3f;
-/// The same for the deepest contact, which a press meets first. What is left out here pushes the bodies apart as soon
-/// as another choice of contacts meets it, and a body that rocks on a crest would gain this height again and again.
+/// The same for the deepest contact, which a motion along the normal touches first. If the kept contacts are less deep,
+/// the bodies are pushed apart by the difference as soon as the deepest one is chosen again. A body that rocks on a
+/// crest would gain this height in each cycle.
 inline constexpr float pressTolerance = reductionTolerance / 16;
 
 struct FirstContacts {

@@ -112,7 +112,7 @@ class LocalField {
     RelativeMotion relativeMotion_;
     float maxDisplacement_;
     float exactReach_;    ///< maximum distance for exact queries of the triangles, where the field has any [m]
-    float farReach_ = 0;  ///< beyond the band, where contacts are asked for there; in the field's units
+    float farReach_ = 0;  ///< the same beyond the band, if contacts there are requested [field's units]
 };
 
 }  // namespace bilayer::detail

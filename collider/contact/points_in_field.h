@@ -179,9 +179,9 @@ class PointsInField {
         }
     }
 
-    // For a sharp point in the other body that opposes no surface there, even on a medial axis: it has penetrated
-    // another vertex and is nearest to its sides. Returns the surface that it opposes a little back along its own
-    // normal, if that place is outside.
+    // For a convex vertex inside the other body whose normal opposes no surface there, or that lies on a medial axis.
+    // It has penetrated another vertex, and the sides of that vertex are nearest. Returns the sample at an offset along
+    // the reversed normal of the point, if that place is outside.
     SurfaceSample opposedSurface(const SurfacePoint& point, const glm::vec3& at, const SurfaceSample& here) const {
         const glm::vec3 normal = transform_.rotated(point.normal);
         const auto cosine = [&](const SurfaceSample& sample) { return -glm::dot(sample.normal, normal); };

@@ -80,7 +80,7 @@ Order detail::orderOf(const PlacedShape& a, const PlacedShape& b) {
         if (!(body->scale > 0) || !std::isfinite(body->scale))
             throw std::invalid_argument("the scale of a shape must be positive and finite");
     const bool isA = a.shape.collider(), isB = b.shape.collider();
-    if (!isA && !isB) throw std::invalid_argument("one of two shapes must be a collider, whose field is asked");
+    if (!isA && !isB) throw std::invalid_argument("at least one of the two shapes must be a collider");
     return {isA && isB, isA};
 }
 

@@ -15,8 +15,8 @@
 
 namespace bilayer::detail {
 
-/// Shorter means of unit normals have cancelled out, or are unknown, and define no side for oblique directions. The
-/// limit is above the rounding of floats, and below the length at the tips of needles.
+/// Min length of a mean of unit normals. The normals of a shorter mean have cancelled out or are unknown, and define no
+/// side for oblique directions. The limit is above the rounding of floats, and below the length at the tips of needles.
 inline constexpr double minMeanNormal = 1e-6;
 
 /// Angle-weighted means of the unit normals around edges and vertices. The length is 1 where the surface is flat, and

@@ -17,16 +17,16 @@ namespace bilayer::detail {
 namespace {
 
 /// Longer triangles are halved: around shorter ones single precision is accurate to 2e-6 [voxels].
-constexpr double longestEdge = 16;
+constexpr double maxEdge = 16;
 /// Thinner triangles have no reliable normal [voxels].
-constexpr double thinnest = 1e-7;
-/// Points farther from the mesh than `farthest` are replaced by points of the same direction at `farEnough` [mesh
-/// sizes]. There, single precision is off by a thousandth of a size, and the change of direction to off-centre features
-/// by half as much. Both are less than a millionth of the distance of points beyond `farthest`.
-constexpr double farthest = 4000, farEnough = 1000;
+constexpr double minHeight = 1e-7;
+/// Points farther from the mesh than `maxDistance` are replaced by points in the same direction at `clampedDistance`
+/// [mesh sizes]. There, single precision is off by a thousandth of a size, and the change of direction to off-centre
+/// features by half as much. Both are less than a millionth of the distance of points beyond `maxDistance`.
+constexpr double maxDistance = 4000, clampedDistance = 1000;
 /// The accuracy of distances: places closer than this count as one. A point projects into a triangle if it is this far
 /// from all edges, despite single-precision rounding [voxels].
-constexpr double samePlace = 1e-5;
+constexpr double distanceTolerance = 1e-5;
 /// Up to this distance, single precision is as accurate as the vertices [voxels].
 constexpr double near = 16;
 /// Max rounding of a point in floats, relative to its largest coordinate.
@@ -56,10 +56,10 @@ OnEdge closestOnEdge(const std::array<glm::dvec3, 3>& c, int from) {
 MeshTree::MeshTree(std::shared_ptr<const Mesh> mesh, float voxelSize)
     : mesh_((validate(*mesh), std::move(mesh))), voxelSize_(voxelSize), perMetre_(1 / double(voxelSize)) {
     const auto makeTree = [&] {
-        tree_ = makeWideTree(*mesh_, voxelSize_, nullptr, {TreeOrder::split, longestEdge});
+        tree_ = makeWideTree(*mesh_, voxelSize_, nullptr, {TreeOrder::split, maxEdge});
         groups_ = makeOrientedGroups(tree_);
     };
-    tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(*mesh_, thinnest * double(voxelSize_)); });
+    tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(*mesh_, minHeight * double(voxelSize_)); });
 }
 
 std::pair<glm::dvec3, glm::dvec3> MeshTree::box() const noexcept {
@@ -75,7 +75,7 @@ bool MeshTree::mayEnclose(const glm::dvec3& point) const noexcept {
 
 glm::dvec3 MeshTree::approached(const glm::dvec3& point) const noexcept {
     const auto [lower, upper] = box();
-    return detail::approached(point, lower, upper, farthest, farEnough);
+    return detail::approached(point, lower, upper, maxDistance, clampedDistance);
 }
 
 NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& point) const noexcept {
@@ -100,7 +100,7 @@ NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& poi
 // The distance from a feature up to which a point counts as on it [m].
 double MeshTree::roomAt(const glm::dvec3& point) const noexcept {
     const double largest = std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)});
-    return std::max(samePlace * double(voxelSize_), pointRounding * largest);
+    return std::max(distanceTolerance * double(voxelSize_), pointRounding * largest);
 }
 
 // Selects the vertex or edge of a triangle that a point on its surface lies on, if any. Keeps the normal if that of the

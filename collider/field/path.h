@@ -41,8 +41,8 @@ inline std::optional<std::pair<double, double>> clip(const Path& path, const glm
     return std::pair(enter, leave);
 }
 
-/// Returns the point itself if it is at most `far` box sizes away from the box centre. Otherwise returns the point of
-/// the same direction at `near` sizes.
+/// Returns the point itself if it is at most `far` box sizes away from the box centre. Otherwise returns the point
+/// in the same direction from the centre, `near` box sizes away.
 inline glm::dvec3 approached(const glm::dvec3& point, const glm::dvec3& lower, const glm::dvec3& upper, double far,
                              double near) {
     const glm::dvec3 centre = 0.5 * (lower + upper), offset = point - centre, diagonal = upper - lower;

@@ -36,9 +36,9 @@ constexpr float bowlFoot = 0.2f;                        // radius of its foot [m
 constexpr float bowlVoxels = 3;                         // edge of its voxels [voxels of the bodies]
 
 constexpr float usualBodiesPerLayer = 5;
-constexpr float layerRadius = 0.26f;  // radius of a layer's ring in the bowl for thirty [m]
-constexpr float minApart = 0.26f;     // min initial distance of bodies' centres, in neighbouring layers too [m]
-constexpr float lastLook = 0.5f;      // how long the recording continues after all bodies are at rest [s]
+constexpr float layerRadius = 0.26f;    // radius of a layer's ring in the bowl for thirty [m]
+constexpr float minApart = 0.26f;       // min initial distance of bodies' centres, in neighbouring layers too [m]
+constexpr float recordedAtRest = 0.5f;  // how long the recording continues after all bodies are at rest [s]
 // A resting pile jitters by far less. Bodies that roll as slowly as allowed elsewhere would continue when they are
 // woken.
 constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]
@@ -174,7 +174,7 @@ Outcome bowl(const BowlOptions& options) {
     }
     stage.run(options.seconds, [&] { return stage.allAsleep(); });
     const int awake = stage.world().moving() - stage.world().asleep();
-    stage.run(stage.time() + lastLook);
+    stage.run(stage.time() + recordedAtRest);
     const double drifted = options.hold > 0 ? drift(stage, bodies, options.hold) : 0;
     const float rim = radius * std::sin(bowlOpening);
     const auto left = std::count_if(bodies.begin(), bodies.end(), [&](const btRigidBody* body) {

@@ -39,10 +39,11 @@ constexpr double halfTooth = 0.5;
 
 constexpr const char* factoryGear = "factory_gear_medium.ply";
 constexpr int factoryTeeth = 40;
-constexpr float factoryModule = 1e-3f;   // [m]
-constexpr float factoryAxis = 20e-3f;    // position of its bore along x [m]
-constexpr float factoryApart = 0.5e-3f;  // additional axis distance in the data set, beyond half the diameters [m]
-constexpr double tips = 0.98;            // relative to the max radius: points beyond belong to a tooth's tip
+constexpr float factoryModule = 1e-3f;  // [m]
+constexpr float factoryAxis = 20e-3f;   // position of its bore along x [m]
+constexpr float factoryExtraDistance =
+    0.5e-3f;                   // additional axis distance in the data set, beyond half the diameters [m]
+constexpr double tips = 0.98;  // relative to the max radius: points beyond belong to a tooth's tip
 
 constexpr std::uint32_t colours[] = {0xe07a5f, 0x9db4d6, 0xf2cc8f, 0x81b29a};
 
@@ -122,7 +123,7 @@ Train Train::ofFactory(const std::filesystem::path& folder) {
     const glm::quat rotation = glm::angleAxis(-float(std::arg(sum) / factoryTeeth), glm::vec3(0, 0, 1));
     for (glm::vec3& point : mesh.points) point = rotation * point;
     const shapes::Gear part{.teeth = factoryTeeth, .toothModule = factoryModule};
-    return {{part, part}, {mesh, mesh}, factoryApart};
+    return {{part, part}, {mesh, mesh}, factoryExtraDistance};
 }
 
 // Adds the gears one after another, each centred in the backlash.

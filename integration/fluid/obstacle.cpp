@@ -168,7 +168,7 @@ void addVelocity(Solid& solid, const Velocity& velocity, const glm::vec3& centre
 }
 
 void check(const SolidOptions& options, const Transform& cells) {
-    if (!cells.isLinear() || !cells.hasUniformScale()) throw std::invalid_argument("solid: the cells are no cubes");
+    if (!cells.isLinear() || !cells.hasUniformScale()) throw std::invalid_argument("solid: the cells must be cubes");
     const double voxel = cells.voxelSize()[0];
     for (int axis = 0; axis < 3; ++axis) {
         openvdb::Vec3d unit(0);

@@ -62,7 +62,7 @@ Vec3d jitter(std::uint64_t bits) {
 
 void require(const openvdb::math::Transform& voxels, const ParticleOptions& options) {
     if (!voxels.isLinear() || !voxels.hasUniformScale())
-        throw std::invalid_argument("particles: the voxels are no cubes");
+        throw std::invalid_argument("particles: the voxels must be cubes");
     if (options.perVoxel < 1 || options.perVoxel > maxPerVoxel)
         throw std::invalid_argument("particles: perVoxel must be in 1..1000");
 }

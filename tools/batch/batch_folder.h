@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a batch keeps its files.
+// Tested by tests/tools/batch.cpp through run().
 #pragma once
 
 #include <filesystem>

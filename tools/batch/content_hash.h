@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Hashes of contents and names, the same on every machine.
+// Tested by tests/tools/batch.cpp through run().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From one mesh file to one field file: what a worker of a batch does.
+// Tested by tests/tools/batch.cpp through run().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Locks of outputs, for batches that overlap.
+// Tested by tests/tools/batch.cpp through run().
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small greyscale pictures as PNG files.
+// Tested by tests/tools/batch_report.cpp through run().
 #pragma once
 
 #include <cstdint>

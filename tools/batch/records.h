@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The records of a batch: one JSON object a line for each mesh.
+// Tested by tests/tools/batch.cpp through run().
 #pragma once
 
 #include <filesystem>

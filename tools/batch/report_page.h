@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The report of a batch as a page.
+// Tested by tests/tools/batch_report.cpp through run().
 #pragma once
 
 #include <string>

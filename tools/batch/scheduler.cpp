@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Time between two looks at outputs that other batches have locked, and max time between two progress lines [ms].
+// Time between two checks of outputs that other batches have locked, and max time between two progress lines [ms].
 constexpr int lockInterval = 200, progressInterval = 500;
 
 /// A mesh whose worker runs.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shares of a batch for several machines.
+// Tested by tests/tools/batch.cpp through run().
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the records of a batch say together.
+// Tested by tests/tools/batch_report.cpp through run().
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Processes that convert one mesh each.
+// Tested by tests/tools/batch_limits.cpp through run().
 #pragma once
 
 #include <sys/types.h>

@@ -9,9 +9,9 @@
 
 namespace bilayer::bullet::detail {
 
-/// The bodies that one of the last two steps moved by more than a margin. The solver leaves a part of the speed that it
-/// takes away in an impact, and begins the next step with the impulses of the impact. So these bodies are checked even
-/// if what is left moves them by less than a margin.
+/// The bodies that one of the last two steps moved by more than a margin. In an impact the solver does not
+/// remove all of the approach speed in one step, and it begins the next step with the impulses of the impact. So these
+/// bodies are checked even if what is left moves them by less than a margin.
 class RecentlyFastBodies {
   public:
     using Objects = std::vector<const btCollisionObject*>;  ///< sorted by address

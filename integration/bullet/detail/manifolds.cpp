@@ -21,8 +21,8 @@ namespace {
 // pulled back [fractions of Continuity::sameWithin].
 constexpr float stickingLimit = 0.98f, maxDrift = 0.25f;
 // The time until a contact bears its full resting friction [steps], and the slip that removes it [fractions of
-// Continuity::sameWithin]. It falls gradually, so that other contacts have time to take over the load. Sticking
-// contacts are not known to slip more in one step.
+// Continuity::sameWithin]. It falls gradually, so that other contacts have time to take over the load. In all
+// measured piles, sticking contacts slip less in one step.
 constexpr float stepsOfRest = 120, slipOfRest = 0.05f;
 
 /// The identifiers of a contact in a manifold point.
