@@ -103,6 +103,7 @@ class GltfScene {
     void placeNodes();
     void placeMesh(std::size_t node);
     std::vector<glm::dmat4> instances(const tinygltf::Node& node, std::size_t index) const;
+    bool hasData(int accessor) const;
     void readPrimitive(ScenePart& part, const tinygltf::Primitive& primitive, const std::string& name);
     void applySkin(ScenePart& part, const tinygltf::Primitive& primitive, int skin, const std::string& name) const;
     void addNotes();
@@ -207,6 +208,13 @@ std::vector<glm::dmat4> GltfScene::instances(const tinygltf::Node& node, std::si
     return transforms;
 }
 
+// Whether the file has the values of an accessor. An accessor out of range is an error of its own.
+bool GltfScene::hasData(int accessor) const {
+    if (accessor < 0 || std::size_t(accessor) >= model_.accessors.size()) return true;
+    const tinygltf::Accessor& values = model_.accessors[std::size_t(accessor)];
+    return values.bufferView >= 0 || values.sparse.isSparse;
+}
+
 void GltfScene::readPrimitive(ScenePart& part, const tinygltf::Primitive& primitive, const std::string& name) {
     require(primitive.mode >= TINYGLTF_MODE_POINTS && primitive.mode <= TINYGLTF_MODE_TRIANGLE_FAN,
             "{} has mode {}; it must be 0 to 6", name, primitive.mode);
@@ -214,12 +222,14 @@ void GltfScene::readPrimitive(ScenePart& part, const tinygltf::Primitive& primit
         ++omitted_.linesOrPoints;
         return;
     }
-    for (const char* compression : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"})
-        require(!primitive.extensions.count(compression), "{} uses {}, which is not read; export it without", name,
-                compression);
     omitted_.morphed += !primitive.targets.empty();
     const auto positions = primitive.attributes.find("POSITION");
     require(positions != primitive.attributes.end(), "{} has no POSITION", name);
+    // an optional compression leaves the uncompressed data in the file
+    for (const char* compression : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"})
+        require(!primitive.extensions.count(compression) ||
+                    (hasData(positions->second) && (primitive.indices < 0 || hasData(primitive.indices))),
+                "{} uses {}, which is not read; export it without", name, compression);
     part.points = numbers_.vectors3(positions->second, "POSITION");
     std::vector<unsigned> vertices;
     if (primitive.indices >= 0) {

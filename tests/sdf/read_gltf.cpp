@@ -254,7 +254,11 @@ TEST_CASE("glTF: unknown required extensions are rejected by name") {
     Gltf gltf = Gltf::cube();
     gltf.file["extensionsUsed"] = {"KHR_draco_mesh_compression"};
     primitive(gltf)["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 0}};
-    refuses(gltf, {"primitive 0 of mesh 0", "KHR_draco_mesh_compression"});
-    gltf.file["accessors"][1].erase("bufferView");
-    refuses(gltf, {"KHR_draco_mesh_compression"});
+    CHECK(volume(readGltf(gltf)) == 8);  // the uncompressed data are there too
+    for (auto& accessor : gltf.file["accessors"]) {
+        const auto view = accessor["bufferView"];
+        accessor.erase("bufferView");
+        refuses(gltf, {"KHR_draco_mesh_compression"});
+        accessor["bufferView"] = view;
+    }
 }
