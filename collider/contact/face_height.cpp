@@ -64,10 +64,8 @@ float FaceHeight::distanceAlongAxis(const SurfacePoint& vertex, const glm::vec3&
 bool FaceHeight::hasPenetrated(const SurfacePoint& vertex, const glm::vec3& normal, float height,
                                float distance) const {
     const glm::vec3 place = field_.placed.scale * vertex.position, through = place - distance * vertex.normal;
-    const auto continuesBehind = [&](float errors) {
-        return field_.local.at(through - errors * maxInterpolationError * field_.voxel * vertex.normal).distance < 0;
-    };
-    if (!continuesBehind(1) && !continuesBehind(2) && !continuesBehind(3)) return false;
+    const glm::vec3 behind = through - maxInterpolationError * field_.voxel * vertex.normal;
+    if (!(field_.local.at(behind).distance < 0)) return false;
     if (-height < field_.voxel) return true;
     return glm::dot(field_.local.at(through).normal, normal) > farSide &&
            triangles_.distance(through) < touchingFoot * field_.voxel &&
