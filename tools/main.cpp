@@ -1,20 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer`: fields from meshes on the command line. Exit status 0: done; 1: input or machine at fault, one line on
 // stderr; 2: wrong usage.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <new>
-#include <regex>
 #include <string>
 #include <system_error>
 
 #include "sdf/io/atomic_file.h"
 #include "tools/commands.h"
+#include "tools/output.h"
 
 namespace {
 
 enum Status { done = 0, fault = 1, usage = 2 };
+
+// Opens closed standard streams, in modes in which reading and writing fail: else a file that is opened later would
+// take their place, and receive messages.
+void fillStandardStreams() {
+    for (int stream = STDIN_FILENO; stream <= STDERR_FILENO; ++stream)
+        if (::fcntl(stream, F_GETFD) < 0) (void)!::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+}
 
 void setSignals() {
     bilayer::detail::removeAtomicFilesOnSignal();
@@ -25,7 +36,14 @@ void setSignals() {
 
 // Errors of devices and files may have several lines; the contract is one line.
 int complain(const std::string& message) {
-    std::fprintf(stderr, "bilayer: %s\n", std::regex_replace(message, std::regex("\\s*\n\\s*"), "; ").c_str());
+    constexpr const char* spaces = " \t\r\n";
+    std::string line;
+    for (std::size_t begin = 0, end = 0; begin < message.size(); begin = message.find_first_not_of(spaces, end)) {
+        end = std::min(message.find('\n', begin), message.size());
+        if (begin > 0) line += "; ";
+        line += message.substr(begin, message.find_last_not_of(spaces, end) + 1 - begin);
+    }
+    std::fprintf(stderr, "bilayer: %s\n", bilayer::tools::printable(line).c_str());
     return fault;
 }
 
@@ -37,6 +55,7 @@ int flushOutput() {
 }  // namespace
 
 int main(int count, char** arguments) {
+    fillStandardStreams();
     setSignals();
     CLI::App app("Narrow-band signed distance fields from triangle meshes, in OpenVDB files.", "bilayer");
     app.set_version_flag("--version", bilayer::tools::versions());
