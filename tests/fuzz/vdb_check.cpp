@@ -109,7 +109,7 @@ openvdb::Metadata::Ptr changedEntry(const openvdb::Metadata& entry, ByteSource& 
     for (unsigned count = 1 + bytes.below(4); count > 0 && data.size() > head; --count)
         data[head + bytes.below(65536) % (data.size() - head)] = char(bytes.byte());
     std::istringstream in(data, std::ios::binary);
-    const openvdb::Metadata::Ptr changed = openvdb::Metadata::createMetadata(entry.typeName());
+    const openvdb::Metadata::Ptr changed = entry.copy();
     changed->read(in);
     return changed;
 }
