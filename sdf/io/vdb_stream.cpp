@@ -88,7 +88,8 @@ void VdbStream::skipMetadata() {
         const bool fixed = type != "string" && openvdb::Metadata::isRegisteredType(type);
         const std::uint64_t expected = fixed ? openvdb::Metadata::createMetadata(type)->size() : size;
         if (size != expected)
-            throw std::runtime_error(fmt::format("{} of {} bytes, where {} are expected", quotedWord(name), size, expected));
+            throw std::runtime_error(
+                fmt::format("{} of {} bytes, where {} are expected", quotedWord(name), size, expected));
         skip(size, "metadata");
     }
 }
