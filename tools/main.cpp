@@ -47,6 +47,16 @@ int complain(const std::string& message) {
     return fault;
 }
 
+// Returns whether a word is empty, and reports it: CLI11 2.2 takes it for the name of an option group, and never ends.
+bool hasEmptyWord(int count, char** arguments) {
+    for (int i = 1; i < count; ++i)
+        if (*arguments[i] == '\0') {
+            std::fprintf(stderr, "argument %d is empty; leave it out, or write a value\n", i);
+            return true;
+        }
+    return false;
+}
+
 int flushOutput() {
     if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return done;
     return complain("cannot write to standard output: " + std::generic_category().message(errno));
@@ -57,6 +67,7 @@ int flushOutput() {
 int main(int count, char** arguments) {
     fillStandardStreams();
     setSignals();
+    if (hasEmptyWord(count, arguments)) return usage;
     CLI::App app("Narrow-band signed distance fields from triangle meshes, in OpenVDB files.", "bilayer");
     app.set_version_flag("--version", bilayer::tools::versions());
     app.require_subcommand(1);
