@@ -12,6 +12,7 @@
 #include "sdf/base/exact_error.h"
 #include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/base/quoted_text.h"
 
 namespace bilayer {
 
@@ -39,15 +40,15 @@ Value meta(const openvdb::GridBase& grid, const char* name, const Value& fallbac
     if (!entry) return fallback;
     const auto typed = openvdb::DynamicPtrCast<const openvdb::TypedMetadata<Value>>(entry);
     if (!typed)
-        throw std::invalid_argument(fmt::format("grid '{}': '{}' is of type {}, not {}", grid.getName(), name,
-                                                entry->typeName(), openvdb::typeNameAsString<Value>()));
+        throw std::invalid_argument(fmt::format("grid {}: '{}' is of type {}, not {}", quotedWord(grid.getName()), name,
+                                                quotedWord(entry->typeName()), openvdb::typeNameAsString<Value>()));
     return typed->value();
 }
 
 void require(bool holds, const openvdb::GridBase& grid, const char* entry, const auto& value, const char* range) {
     if (!holds)
         throw std::invalid_argument(
-            fmt::format("grid '{}': {} is {}, and must be {}", grid.getName(), entry, value, range));
+            fmt::format("grid {}: {} is {}, and must be {}", quotedWord(grid.getName()), entry, value, range));
 }
 
 void requireWidth(const openvdb::GridBase& grid, const char* entry, float width) {
@@ -58,7 +59,7 @@ void requireWidth(const openvdb::GridBase& grid, const char* entry, float width)
 std::string requireName(const openvdb::GridBase& grid, const char* entry, const auto& names) {
     const auto name = meta<std::string>(grid, entry, "");
     if (std::find(std::begin(names), std::end(names), name) == std::end(names))
-        throw std::invalid_argument(fmt::format("grid '{}': '{}' is none of {}", grid.getName(), entry,
+        throw std::invalid_argument(fmt::format("grid {}: '{}' is none of {}", quotedWord(grid.getName()), entry,
                                                 fmt::join(std::begin(names) + 1, std::end(names), ", ")));
     return name;
 }
@@ -78,21 +79,22 @@ void requireSignOfMethod(const openvdb::GridBase& grid, const std::string& metho
         return method.empty() || sign.empty() || (method == itsMethod) == (sign == itsSigns);
     };
     if (!agree(nameOf(Method::doubleLayer), layerSigns) || !agree(nameOf(Method::prism), prismSigns))
-        throw std::invalid_argument(fmt::format("grid '{}': '{}' is {}, which the method {} does not have",
-                                                grid.getName(), metadata::sign, sign, method));
+        throw std::invalid_argument(fmt::format("grid {}: '{}' is {}, which the method {} does not have",
+                                                quotedWord(grid.getName()), metadata::sign, sign, method));
 }
 
 void requireLevelSet(const Grids& grids) {
     if (!grids.distance) throw std::invalid_argument("the field has no distance grid");
     const openvdb::FloatGrid& grid = *grids.distance;
     if (grid.getGridClass() != openvdb::GRID_LEVEL_SET)
-        throw std::invalid_argument(fmt::format("grid '{}' is no level set", grid.getName()));
+        throw std::invalid_argument(fmt::format("grid {} is no level set", quotedWord(grid.getName())));
     if (!grid.hasUniformVoxels() || !grid.transform().isLinear())
-        throw std::invalid_argument(fmt::format("grid '{}' has voxels that are no cubes", grid.getName()));
+        throw std::invalid_argument(fmt::format("grid {} has voxels that are no cubes", quotedWord(grid.getName())));
     const double h = grid.voxelSize()[0];
     require(h >= minStoredVoxel && h <= maxStoredVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
     requireWidth(grid, "the background", grid.background());
-    if (grid.activeVoxelCount() == 0) throw std::invalid_argument(fmt::format("grid '{}' is empty", grid.getName()));
+    if (grid.activeVoxelCount() == 0)
+        throw std::invalid_argument(fmt::format("grid {} is empty", quotedWord(grid.getName())));
     // Requires a shift by whole voxels along the axes: queries work in index space and must not need a rotation.
     const openvdb::Vec3d origin = grid.indexToWorld(openvdb::Vec3d(0)) / h;
     for (int axis = 0; axis < 3; ++axis) {
@@ -102,7 +104,7 @@ void requireLevelSet(const Grids& grids) {
         if (!step.eq(unit, 1e-5) || !(std::abs(origin[axis] - std::round(origin[axis])) <= 1e-3) ||
             !grid.worldToIndex(world).eq(unit, 1e-3))
             throw std::invalid_argument(
-                fmt::format("grid '{}' is rotated, mirrored or shifted by parts of a voxel", grid.getName()));
+                fmt::format("grid {} is rotated, mirrored or shifted by parts of a voxel", quotedWord(grid.getName())));
         require(std::abs(origin[axis]) <= maxOrigin, grid, "the shift", origin[axis], "at most 2^40 voxels");
     }
 }

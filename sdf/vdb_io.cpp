@@ -14,6 +14,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/openvdb.h"
+#include "sdf/base/quoted_text.h"
 #include "sdf/grid/distance_check.h"
 #include "sdf/io/atomic_file.h"
 #include "sdf/io/input_file.h"
@@ -125,7 +126,8 @@ LevelSet readVdb(const std::filesystem::path& path) {
         // With delayed loading, the values and any damage to them would stay in the file.
         grids = *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
     } catch (const std::exception& error) {
-        throw std::runtime_error(fmt::format("{}: is no .vdb file or is damaged ({})", path.string(), error.what()));
+        throw std::runtime_error(
+            fmt::format("{}: is no .vdb file or is damaged ({})", path.string(), oneLine(error.what())));
     }
     const glm::dvec3 origin = originOf(grids);
     for (const auto& grid : grids) shift(*grid, -origin);

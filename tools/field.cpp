@@ -63,6 +63,7 @@ void runQuery(const FieldArguments& a) {
         fmt::print("{:.9g} {:.9g} {:.9g} {:.9g} {}\n", s.distance, s.gradient.x, s.gradient.y, s.gradient.z,
                    int(s.inBand));
     }
+    if (std::cin.bad()) throw std::runtime_error("cannot read standard input: is it closed, or a folder?");
 }
 
 void runSurface(const FieldArguments& a) {

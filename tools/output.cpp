@@ -60,11 +60,22 @@ std::string orientation(const MeshReport& report) {
 
 }  // namespace
 
+std::string printable(std::string text) {
+    // U+0080 to U+009F are control characters too
+    constexpr unsigned char firstOfTwo = 0xc2, lastControl = 0x9f;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const auto here = static_cast<unsigned char>(text[i]), next = static_cast<unsigned char>(text[i + 1]);
+        if (here < ' ' || here == 0x7f) text[i] = '?';
+        if (here == firstOfTwo && next >= 0x80 && next <= lastControl) text[i] = text[i + 1] = '?';
+    }
+    return text;
+}
+
 void Table::print() const {
     std::size_t width = 0;
     for (const auto& [label, value] : rows_) width = std::max(width, label.size());
-    fmt::print("{}\n", title_);
-    for (const auto& [label, value] : rows_) fmt::print("  {:<{}}  {}\n", label, width, value);
+    fmt::print("{}\n", printable(title_));
+    for (const auto& [label, value] : rows_) fmt::print("  {:<{}}  {}\n", label, width, printable(value));
 }
 
 void print(const Json& json) {

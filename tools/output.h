@@ -24,6 +24,9 @@ namespace bilayer::tools {
 
 using Json = nlohmann::ordered_json;
 
+/// Replaces characters that steer a terminal by question marks: files may contain any. UTF-8 stays.
+std::string printable(std::string text);
+
 /// Rows of a label and a value, printed in two columns.
 class Table {
   public:

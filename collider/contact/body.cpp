@@ -20,6 +20,7 @@
 #include "collider/contact/stored_points.h"
 #include "collider/field/field_data.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/base/quoted_text.h"
 #include "sdf/sign/sign_choice.h"
 
 namespace bilayer::detail {
@@ -62,8 +63,8 @@ class Entries {
         if (!entry) return std::nullopt;
         const auto typed = openvdb::DynamicPtrCast<const openvdb::TypedMetadata<Value>>(entry);
         if (!typed)
-            refuseBody(
-                fmt::format("'{}' is of type {}, not {}", name, entry->typeName(), openvdb::typeNameAsString<Value>()));
+            refuseBody(fmt::format("'{}' is of type {}, not {}", name, quotedWord(entry->typeName()),
+                                   openvdb::typeNameAsString<Value>()));
         return typed->value();
     }
 
@@ -182,7 +183,7 @@ constexpr std::pair<ContactAccuracy, const char*> accuracyNames[] = {{ContactAcc
 ContactAccuracy accuracyOf(const std::string& name) {
     for (const auto& [accuracy, itsName] : accuracyNames)
         if (name == itsName) return accuracy;
-    refuseBody(fmt::format("'{}' is '{}', and must be samples, edges or triangles", entry::measure, name));
+    refuseBody(fmt::format("'{}' is {}, and must be samples, edges or triangles", entry::measure, quotedWord(name)));
 }
 
 // Detects a field that was moved or scaled by another program, without its body.

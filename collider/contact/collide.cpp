@@ -10,6 +10,7 @@
 #include "collider/contact/closest_points.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/contact_cache.h"
+#include "collider/contact/finite_contacts.h"
 #include "collider/contact/normal_filter.h"
 #include "collider/contact/points_in_field.h"
 #include "collider/contact/sampled_contacts.h"
@@ -104,7 +105,10 @@ ContactReport collideFound(const Placed& a, const Placed& b, const ContactOption
             points.visitFound(some, report, found);
         };
     };
-    return addContacts(a, b, options, contacts, visit(ofA), visit(ofB));
+    const std::size_t first = contacts.size();
+    const ContactReport report = addContacts(a, b, options, contacts, visit(ofA), visit(ofB));
+    removeInfinite(contacts, first);
+    return report;
 }
 
 }  // namespace bilayer::detail
@@ -134,6 +138,7 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
     const ContactReport report = addContacts(a, b, options, contacts, visit(lists ? &lists->ofA : nullptr),
                                              visit(lists ? &lists->ofB : nullptr));
     if (options.exact) refineClosest(std::span(contacts).subspan(first), a, b);
+    removeInfinite(contacts, first);
     if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);
     return report;
 }

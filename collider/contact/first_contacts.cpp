@@ -147,10 +147,10 @@ class Separations {
         return result;
     }
 
-    /// The first contact with this separation after the last motion.
-    std::uint32_t with(float gap) const {
+    /// The contact of minimum separation after the last motion, the first of several.
+    std::uint32_t nearest() const {
         const float* now = numbers_.data() + moved * padded_;
-        return std::uint32_t(std::find(now, now + count_, gap) - now);
+        return std::uint32_t(std::min_element(now, now + count_) - now);
     }
 
     float extent() const { return extent_; }
@@ -191,11 +191,13 @@ class FirstContactSearch {
         for (std::size_t n = 0; n < perturbations_.size(); ++n) {
             if (metByAny() >> n & 1 || (kept_.size() >= maxContacts && isNearlyMet(n))) continue;
             separations_.minSeparation(perturbations_[n]);
-            add(separations_.with(minSeparations_[n]));
+            add(separations_.nearest());
         }
         for (std::size_t i = kept_.size(); i-- > 0;)
             if (isSpare(i) && !mayBear(kept_[i])) leaveOut(i);
         while (kept_.size() > maxContacts) leaveOut(redundant());
+        // where separations exceed floats, no motion meets any
+        if (kept_.empty()) add(separations_.nearest());
         return kept_;
     }
 

@@ -100,9 +100,9 @@ void LocalField::probeEdge(const ProbedEdge& edge, const FieldSample& first, con
     if (edge.isStraight && !mayReach(edge.place(0), edge.place(1), reach)) return;
     FieldSample before = first;
     for (int i = 0; i < intervals;) {
-        // Intervals that are clear of the surface need no probes.
+        // Intervals that are clear of the surface need no probes. The count is no number where floats overflow.
         const float clear = (before.distance - reach) * float(intervals) / length;
-        const int next = i + std::max(1, int(std::min(clear, float(intervals - i))));
+        const int next = i + (clear > 1 ? int(std::min(clear, float(intervals - i))) : 1);
         const float fraction = float(next) / float(intervals);
         FieldSample there = last;
         if (next < intervals) {

@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "collider/contact/contact_reduction.h"
+#include "collider/contact/finite_contacts.h"
 #include "collider/contact/narrow_phase.h"
 #include "collider/contact/placed_shapes.h"
 #include "collider/contact/shape_data.h"
@@ -93,6 +94,7 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
         order.isSwapped ? collideShape(b, placed(a), options, contacts) : collideShape(a, placed(b), options, contacts);
     if (order.isSwapped)
         for (std::size_t i = first; i < contacts.size(); ++i) contacts[i] = swapped(contacts[i]);
+    removeInfinite(contacts, first);
     if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);
     return report;
 }

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "collider/contact/stored_body.h"
+#include "sdf/base/quoted_text.h"
 
 namespace bilayer::detail {
 namespace {
@@ -48,7 +49,7 @@ openvdb::Metadata::Ptr packMesh(const Mesh& mesh) {
 
 std::shared_ptr<Mesh> unpackMesh(const openvdb::Metadata& entry) {
     const auto* stored = dynamic_cast<const Bytes*>(&entry);
-    if (!stored) refuseBody(fmt::format("'{}' is of type {}", meshEntry, entry.typeName()));
+    if (!stored) refuseBody(fmt::format("'{}' is of type {}", meshEntry, quotedWord(entry.typeName())));
     const Bytes::ByteVec& bytes = stored->value();
     MeshHead head{};
     std::memcpy(&head, bytes.data(), std::min(sizeof(head), bytes.size()));

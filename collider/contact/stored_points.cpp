@@ -17,6 +17,7 @@
 #include "collider/contact/stored_body.h"
 #include "collider/field/field_data.h"
 #include "sdf/base/openvdb_points.h"
+#include "sdf/base/quoted_text.h"
 
 namespace bilayer::detail {
 namespace {
@@ -135,7 +136,7 @@ SurfacePoints loadPoints(const LevelSet& levelSet) {
     try {
         return load(*grid);
     } catch (const openvdb::Exception& error) {
-        refuseBody(fmt::format("grid '{}': {}", contactPoints, error.what()));
+        refuseBody(fmt::format("grid '{}': {}", contactPoints, oneLine(error.what())));
     }
 }
 

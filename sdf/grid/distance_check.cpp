@@ -12,6 +12,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/openvdb.h"
+#include "sdf/base/quoted_text.h"
 #include "sdf/io/vdb_archive.h"
 
 namespace bilayer::detail {
@@ -41,7 +42,7 @@ class DistanceCheck {
 
   private:
     [[noreturn]] void refuse(const std::string& why) const {
-        throw std::invalid_argument(fmt::format("grid '{}' {}", grid_.getName(), why));
+        throw std::invalid_argument(fmt::format("grid {} {}", quotedWord(grid_.getName()), why));
     }
 
     [[noreturn]] void refuseInterior(const char* voxel, float distance, const char* range) const {

@@ -45,7 +45,9 @@ std::filesystem::path resolve(const std::filesystem::path& target) {
 std::filesystem::path nameNextTo(const std::filesystem::path& target) {
     static std::atomic<unsigned> count{0};
     const std::string suffix = "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part";
-    return target.parent_path() / ("." + target.filename().string() + suffix);
+    // part of a long name: the suffix must fit
+    const std::string name = "." + target.filename().string();
+    return target.parent_path() / (name.substr(0, NAME_MAX - suffix.size()) + suffix);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "sdf/base/quoted_text.h"
 #include "sdf/io/assimp_reader.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/polygon_record.h"
@@ -20,7 +21,6 @@ constexpr std::chrono::seconds baseTime{60}, timePerMegabyte{10};
 constexpr std::size_t baseMemory = std::size_t(2)
                                    << 30;  // [bytes]: compressed and text formats expand when they are read
 constexpr std::size_t memoryPerByte = 100;
-constexpr std::size_t longestError = 300;  // [bytes]: importers quote the contents of the file
 
 // "DAE" for a.dae
 std::string formatOf(const std::filesystem::path& path) {
@@ -32,16 +32,6 @@ std::string formatOf(const std::filesystem::path& path) {
 
 bool isGltf(const std::string& format) {
     return format == "GLTF" || format == "GLB";
-}
-
-// Makes one line of a text, which an importer may have made of damaged input.
-std::string oneLine(std::string text) {
-    for (char& c : text)
-        if (std::iscntrl(static_cast<unsigned char>(c)) || static_cast<unsigned char>(c) >= 0x80) c = ' ';
-    const std::size_t end = text.find_last_not_of(' ');
-    text.erase(end == std::string::npos ? 0 : end + 1);
-    if (text.size() > longestError) text = text.substr(0, text.rfind(' ', longestError)) + " ...";
-    return text.empty() ? "cannot be read" : text;
 }
 
 void readInChild(const std::filesystem::path& path, std::size_t memory, const ChildProcess::Send& send) {
@@ -58,7 +48,8 @@ void readInChild(const std::filesystem::path& path, std::size_t memory, const Ch
     } catch (const std::length_error&) {  // from a container larger than the address space
         return tooLarge();
     } catch (const std::runtime_error& error) {
-        return sendError(send, oneLine(error.what()));
+        const std::string why = oneLine(error.what());
+        return sendError(send, why.empty() ? "cannot be read" : why);
     } catch (const std::exception&) {  // a failed check within a library, whose text is not about the file
         return sendError(send, "the importer cannot make sense of it; it may be damaged");
     }

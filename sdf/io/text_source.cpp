@@ -16,8 +16,6 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t maxQuoted = 40;  // characters
-
 enum class Encoding { bytes, utf16Little, utf16Big };
 
 // Detects the encoding by the byte order mark, or by the zero bytes of ASCII letters in UTF-16.
@@ -96,13 +94,6 @@ bool Cursor::integer(long long& value) {
     if (error != std::errc() || (from != at && from != end && *from == '-')) return false;
     at = next;
     return true;
-}
-
-std::string quotedWord(std::string_view word) {
-    std::string shown(word.substr(0, maxQuoted));
-    for (char& c : shown)
-        if (!std::isprint(static_cast<unsigned char>(c))) c = '?';
-    return fmt::format("'{}{}'", shown, word.size() > maxQuoted ? "..." : "");
 }
 
 std::string counted(std::size_t count, std::string_view one, std::string_view many) {

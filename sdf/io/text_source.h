@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "sdf/base/quoted_text.h"
+
 namespace bilayer::detail {
 
 /// Text that one task reads [bytes].
@@ -88,10 +90,6 @@ struct Cursor {
     /// Reads a decimal integer in the same way.
     bool integer(long long& value);
 };
-
-/// Returns a word of a file in quotation marks, truncated to 40 characters. Unprintable characters become question
-/// marks.
-std::string quotedWord(std::string_view word);
 
 /// "1 face", "2 faces".
 std::string counted(std::size_t count, std::string_view one, std::string_view many);

@@ -22,11 +22,12 @@ namespace {
 
 // The type's name determines the count of numbers.
 void skipTransform(VdbStream& in) {
-    const std::string type = in.readName();
+    std::string type = in.readName();
     constexpr std::uint64_t vector = 3 * sizeof(double), matrix = 16 * sizeof(double);
     if (type == "NonlinearFrustumMap") {
         in.skip(2 * vector + 2 * sizeof(double), "a transform");
-        return skipTransform(in);
+        // of a second map, which is linear: OpenVDB would read frustums within frustums by recursion
+        type = in.readName();
     }
     const std::pair<std::string_view, std::uint64_t> sizes[] = {{"AffineMap", matrix},
                                                                 {"UnitaryMap", matrix},

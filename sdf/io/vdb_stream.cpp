@@ -6,6 +6,8 @@
 
 #include <stdexcept>
 
+#include "sdf/base/quoted_text.h"
+
 namespace bilayer::detail {
 namespace {
 
@@ -86,7 +88,8 @@ void VdbStream::skipMetadata() {
         const bool fixed = type != "string" && openvdb::Metadata::isRegisteredType(type);
         const std::uint64_t expected = fixed ? openvdb::Metadata::createMetadata(type)->size() : size;
         if (size != expected)
-            throw std::runtime_error(fmt::format("'{}' of {} bytes, where {} are expected", name, size, expected));
+            throw std::runtime_error(
+                fmt::format("{} of {} bytes, where {} are expected", quotedWord(name), size, expected));
         skip(size, "metadata");
     }
 }

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <cstdlib>
 #include <span>
 #include <stdexcept>
 
@@ -36,10 +35,13 @@ std::uint64_t readMask(VdbStream& in, int log2) {
 void skipBytes(VdbStream& in, const VdbValueFormat& format, std::uint64_t expected) {
     if (!format.zip && !format.blosc) return in.skip(expected, "values");
     const auto length = in.read<std::int64_t>();
-    if (length <= 0 && length != -std::int64_t(expected))
-        throw std::runtime_error(fmt::format("{} bytes of values, where {} are expected", -length, expected));
-    if (length > 0 && format.blosc) return in.skipBlosc(std::uint64_t(length), expected);
-    in.skip(std::uint64_t(std::abs(length)), "values");
+    if (length > 0)
+        return format.blosc ? in.skipBlosc(std::uint64_t(length), expected) : in.skip(std::uint64_t(length), "values");
+    // a negative length is that of values that are not compressed; unsigned, since the lowest one has no opposite
+    const std::uint64_t plain = 0 - std::uint64_t(length);
+    if (plain != expected)
+        throw std::runtime_error(fmt::format("{} bytes of values, where {} are expected", plain, expected));
+    in.skip(plain, "values");
 }
 
 void skipValues(VdbStream& in, const VdbValueFormat& format, std::uint64_t count, std::uint64_t active) {

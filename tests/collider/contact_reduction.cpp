@@ -65,6 +65,17 @@ TEST_CASE("Contact reduction keeps the same contacts under rounding noise, and t
     CHECK(featuresOf(reduce(tilted).patches) == featuresOf(anew));
 }
 
+TEST_CASE("Contact reduction chooses among contacts as far apart as floats reach") {
+    for (const float scale : {1e18f, 1e20f, 1e30f, 1e38f}) {
+        CAPTURE(scale);
+        std::vector<Contact> contacts = circle();
+        for (Contact& contact : contacts) contact.position *= 10 * scale;
+        const ReducedContacts reduced = reduce(contacts);
+        REQUIRE_FALSE(reduced.patches.empty());
+        for (const std::uint32_t feature : featuresOf(reduced.patches)) CHECK(feature < contacts.size());
+    }
+}
+
 TEST_CASE("Contact reduction keeps load-bearing contacts while a body rocks on them") {
     const unsigned start = seed();
     CAPTURE(start);

@@ -284,8 +284,8 @@ TEST_CASE("lengths in a file take no more memory than the file explains, whateve
     for (int i = 0; i < 500; ++i) {
         const auto at = std::size_t(random(0, double(whole.size())));
         const std::uint64_t values[] = {0xffffffffu, 0x7fffffff, 0x80000000u, 0xfffffff0u, 0x10000000u,
-                                        0xffff,      1,          0,           255};
-        write(at, values[std::size_t(random(0, 8.999))], i % 3 ? 4 : 8);
+                                        0xffff,      1,          0,           255,         std::uint64_t(1) << 63};
+        write(at, values[std::size_t(random(0, 9.999))], i % 3 ? 4 : 8);
     }
     REQUIRE(accepted > 0);
 }

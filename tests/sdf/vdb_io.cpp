@@ -12,6 +12,7 @@
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/base/quoted_text.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
@@ -172,6 +173,15 @@ TEST_CASE("a file of ours with one wrong byte, or one too few or too many, is re
     openvdb::io::File(test::scratch("again.vdb").string()).write(*file.getGrids());
     CHECK(readVdb(test::scratch("again.vdb")).grids().distance->activeVoxelCount() ==
           torus().grids().distance->activeVoxelCount());
+}
+
+TEST_CASE("text from a file is short and on one line in messages") {
+    CHECK(detail::quotedWord("facet") == "'facet'");
+    CHECK(detail::quotedWord(std::string(1000, 'a')) == "'" + std::string(40, 'a') + "...'");
+    CHECK(detail::quotedWord("a\x1b\n\xff") == std::string("'a") + "?" + "?" + "?'");
+    CHECK(detail::oneLine("a\nb\t\x1b \n") == "a b");
+    CHECK(detail::oneLine("\n") == "");
+    CHECK(detail::oneLine(std::string(1000, 'a') + " b").size() <= 304);
 }
 
 TEST_CASE("a file without a level set is refused") {

@@ -41,6 +41,11 @@ pid_t launch(const Words& arguments, const Surroundings& s, const std::string& i
         const rlimit limit{rlim_t(s.fileSizeLimit), rlim_t(s.fileSizeLimit)};
         ::setrlimit(RLIMIT_FSIZE, &limit);
     }
+    if (s.memoryLimit >= 0) {
+        const rlimit limit{rlim_t(s.memoryLimit), rlim_t(s.memoryLimit)};
+        ::setrlimit(RLIMIT_AS, &limit);
+    }
+    for (const int stream : s.closed) ::close(stream);
     ::execv(words[0], words.data());
     ::_exit(127);
 }
@@ -61,7 +66,8 @@ std::size_t Result::errorLines() const {
 }
 
 Result run(const Words& arguments, const Surroundings& surroundings) {
-    const std::string in = textFile("stdin", surroundings.input).string();
+    const std::string in =
+        surroundings.inputPath.empty() ? textFile("stdin", surroundings.input).string() : surroundings.inputPath;
     const std::string out = surroundings.output.empty() ? scratch("stdout").string() : surroundings.output;
     const std::string err = scratch("stderr").string();
     Result result;

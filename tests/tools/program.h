@@ -24,7 +24,10 @@ struct Surroundings {
     std::string input{};                   ///< written to its standard input
     long fileSizeLimit = -1;               ///< RLIMIT_FSIZE [bytes]
     std::string output{};                  ///< a path to redirect standard output to, instead of Result::out
-    std::vector<std::string> variables{};  ///< "NAME=value"
+    std::vector<std::string> variables{};  ///< "NAME=value"; "NAME" removes one
+    long memoryLimit = -1;                 ///< RLIMIT_AS [bytes]
+    std::vector<int> closed{};             ///< standard streams that are closed
+    std::string inputPath{};               ///< opened as its standard input, instead of `input`
 };
 
 using Words = std::vector<std::string>;

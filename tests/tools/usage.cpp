@@ -7,6 +7,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/openvdb.h"
+#include "tests/support/damage.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
@@ -212,4 +213,59 @@ TEST_CASE("an input is never overwritten") {
     std::filesystem::create_symlink(field, nano);
     requireUsage({"export", field, "-o", nano.string()}, "would overwrite");
     CHECK(std::filesystem::last_write_time(field) == when);
+}
+
+TEST_CASE("empty words are wrong usage wherever they stand") {
+    const Words words{"build", sphereFile().string(), "-o", rejectedOutput(), "--union", "--resolution", "10"};
+    for (std::size_t at = 0; at <= words.size(); ++at) {
+        Words with = words;
+        with.insert(with.begin() + std::ptrdiff_t(at), "");
+        requireUsage(with, fmt::format("argument {} is empty", at + 1));
+    }
+}
+
+TEST_CASE("any words end a command in an orderly way") {
+    const unsigned seed = bilayer::test::seed();
+    CAPTURE(seed);
+    Damage damage(seed);
+    const std::string mesh = sphereFile().string(), field = fieldFile(), output = scratch("words").string();
+    const Words numbers{"0",   "1",   "-1",    "0.1", "1e-30", "1e30", "1e999",
+                        "nan", "inf", "0x1p3", "1,5", "",      " ",    "9999999999999999999"};
+    const Words options{
+        "--voxel-size",    "--resolution", "--half-width", "--exterior-width", "--interior-width", "--gap", "--margin",
+        "--point-spacing", "--threads",    "--isovalue",   "--method",         "--sign",           "--dt",  "--speed"};
+    const Words others{"--body",
+                       "--triangles",
+                       "--json",
+                       "--report",
+                       "--union",
+                       "--half-float",
+                       "exact",
+                       "winding",
+                       "--",
+                       "-",
+                       "-o",
+                       "\n",
+                       "\xff",
+                       "=",
+                       "--voxel-size=0.1",
+                       "--method=exact",
+                       "double-layer",
+                       "flood"};
+    const auto any = [&](const Words& words) { return words[damage.below(words.size())]; };
+    for (int i = 0; i < 80; ++i) {
+        const std::string command = any({"build", "build", "inspect", "info", "query", "surface", "export", "seed"});
+        Words words{command, damage.below(2) ? mesh : field, "-o", output + any({".vdb", ".ply", ".obj", ".nvdb", ""})};
+        if (command == "inspect" || command == "info" || command == "query") words.resize(2);
+        for (std::size_t count = damage.below(4); count > 0; --count) {
+            words.push_back(any(options));
+            words.push_back(any(damage.below(3) ? Words{"0.1", "0.5", "2"} : numbers));
+        }
+        if (damage.below(2)) words.insert(words.begin() + std::ptrdiff_t(damage.below(words.size() + 1)), any(others));
+        const Result r = run(words);
+        INFO(fmt::format("{}", fmt::join(words, " | ")) << "\n" << r.err);
+        CHECK((r.status >= 0 && r.status <= 2));
+        if (r.status == 1) CHECK(r.errorLines() == 1);
+        if (r.status == 2) CHECK_FALSE(r.err.empty());
+    }
 }
