@@ -58,9 +58,9 @@ void requireVoxels(const openvdb::GridBase& grid) {
     const double rounding = 0.5 * std::numeric_limits<double>::epsilon() * away;
     if (rounding <= maxVoxelRounding) return;
     throw std::invalid_argument(fmt::format(
-        "grid '{}' lies {:.3g} voxels from zero, where a file rounds voxels by {:.1g} of their size and {:g} is "
+        "grid {} lies {:.3g} voxels from zero, where a file rounds voxels by {:.1g} of their size and {:g} is "
         "allowed: move the mesh closer to zero, or take larger voxels",
-        grid.getName(), away, rounding, maxVoxelRounding));
+        quotedWord(grid.getName()), away, rounding, maxVoxelRounding));
 }
 
 /// Returns the origin of the mesh from which a field in a file was built.
