@@ -34,7 +34,7 @@ void check(const Motion& motion) {
                                                 motion.displacement.x, motion.displacement.y, motion.displacement.z,
                                                 motion.rotation.x, motion.rotation.y, motion.rotation.z));
     if (glm::length(glm::dvec3(motion.rotation)) > maxRotation)
-        throw std::invalid_argument(fmt::format("the motion rotates by {:g} rad; at most {:g} are allowed",
+        throw std::invalid_argument(fmt::format("the motion rotates by {:g} rad; at most {:g} rad are allowed",
                                                 glm::length(motion.rotation), maxRotation));
 }
 

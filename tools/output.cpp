@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/output.h"
+#include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 
@@ -12,6 +13,7 @@
 #include <cstdio>
 
 #include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/io/atomic_file.h"
 
 namespace bilayer::tools {
@@ -213,6 +215,15 @@ void addRows(Table& table, const ReadReport& read) {
     for (const std::string& note : read.notes) table.row("note", note);
 }
 
+namespace {
+
+std::int64_t signUndecided(const LevelSet& levelSet) {
+    const auto entry = levelSet.grids().distance->getMetadata<openvdb::Int64Metadata>(metadata::signUndecided);
+    return entry ? entry->value() : 0;
+}
+
+}  // namespace
+
 void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
     const double size = levelSet.voxelSize();
     table.row("voxel size", metres(size));
@@ -228,6 +239,9 @@ void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
     table.row("sign", fmt::format("{}: {}", levelSet.sign(), levelSet.signReason()));
     if (levelSet.sign() == nameOf(Sign::normals))
         table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
+    if (const std::int64_t undecided = signUndecided(levelSet); undecided > 0 && levelSet.sign() == layerSigns)
+        table.row("sign undecided", fmt::format("{}, as near to one layer as to the other",
+                                                counted(std::size_t(undecided), "voxel", "voxels")));
 }
 
 Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
@@ -235,6 +249,7 @@ Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
             {"sign", levelSet.sign()},
             {"signReason", levelSet.signReason()},
             {"signConflicts", levelSet.signConflicts()},
+            {"signUndecided", signUndecided(levelSet)},
             {"errorBound", number(storedErrorBound(levelSet, stored))}};
 }
 

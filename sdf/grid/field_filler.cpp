@@ -28,9 +28,6 @@
 namespace bilayer::detail {
 namespace {
 
-/// Fraction of the voxels that may be equally near to both layers by chance. On clean meshes it is below 0.003.
-constexpr double maxTies = 0.02;
-
 // Returns the distances of blocks, negated where another field of the same surface is negative.
 std::vector<float> withSides(const openvdb::FloatGrid& sides, const FilledBlocks& blocks) {
     std::vector<float> distances(blocks.distances.begin(), blocks.distances.end());
@@ -87,9 +84,6 @@ void FieldFiller::fillWithOwnSigns() {
         fillDoubleLayer(job, extent_.box, options_.doubleLayer, parameters);
     times_.fill += part.lap();
     signs_.undecided = undecided;
-    if (double(undecided) > maxTies * double(filledBlocks_ * blockVoxels))
-        signs_.reason +=
-            fmt::format(", but for {} voxels both are equally near: their side is unknown", undecided.load());
     finish(assembler);
     times_.assemble += part.lap();
 }

@@ -267,7 +267,7 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
 
     requireRefusal(changed(setting("bilayer:measure", std::string("thumb"))), "'bilayer:measure' is 'thumb'");
     requireRefusal(changed([](Distance& grid) { grid.removeMeta("bilayer:measure"); }), "bilayer:measure");
-    requireRefusal(changed(setting("bilayer:mesh", 7.f)), "type float");
+    requireRefusal(changed(setting("bilayer:mesh", 7.f)), "type 'float'");
 
     requireRefusal(changed({}, [](Points& grid) { grid.clear(); }), "no surface points");
     auto grids = std::make_shared<Grids>(stored().grids());
