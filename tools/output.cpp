@@ -240,8 +240,8 @@ void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
     if (levelSet.sign() == nameOf(Sign::normals))
         table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
     if (const std::int64_t undecided = signUndecided(levelSet); undecided > 0 && levelSet.sign() == layerSigns)
-        table.row("sign undecided", fmt::format("{}, as near to one layer as to the other",
-                                                counted(std::size_t(undecided), "voxel", "voxels")));
+        table.row("sign undecided",
+                  fmt::format("{} voxels are as near to one layer as to the other", grouped(std::uint64_t(undecided))));
 }
 
 Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
