@@ -225,11 +225,7 @@ Penetration firstOf(const SweptShape& points, const SweptShape& other, float vox
 Penetration firstPenetration(const SweptShape& a, const SweptShape& b) {
     const float voxel = std::min(voxelOf(a), voxelOf(b));
     const Penetration byA = firstOf(a, b, voxel), byB = firstOf(b, a, voxel).reversed();
-    if (byA.time != byB.time) return earlier(byA, byB);
-    // both at once, as where an edge meets a face: the surface that opposes the motion more, in either order of the
-    // bodies
-    const glm::vec3 motion(a.sweep.displacement() - b.sweep.displacement());
-    return glm::dot(byA.normal, motion) <= glm::dot(byB.normal, motion) ? byA : byB;
+    return earlier(byA, byB, relativeDisplacement(a.sweep, b.sweep));
 }
 
 }  // namespace bilayer::detail

@@ -3,6 +3,7 @@
 // Tested by tests/collider/time_of_impact.cpp through timeOfImpact().
 #pragma once
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include <bilayer/collider/contact.h>
@@ -35,8 +36,12 @@ struct Penetration {
     Penetration reversed() const { return {time, position, -normal}; }
 };
 
-inline Penetration earlier(const Penetration& one, const Penetration& other) {
-    return other.time < one.time ? other : one;
+/// The earlier of two penetrations of the same bodies. Of two at one moment, as where an edge meets a face, the one
+/// that opposes the motion more, so that the answer does not depend on the order of bodies or parts.
+/// @param motion  relativeDisplacement() of the bodies [m]
+inline Penetration earlier(const Penetration& one, const Penetration& other, const glm::vec3& motion) {
+    if (one.time != other.time) return other.time < one.time ? other : one;
+    return glm::dot(other.normal, motion) < glm::dot(one.normal, motion) ? other : one;
 }
 
 /// Follows points of each shape through the other one: the surface points of a collider, and the vertices and edges of

@@ -61,6 +61,11 @@ class Sweep {
     double stopTime_ = 1;
 };
 
+/// The displacement of A as seen from B [m].
+inline glm::vec3 relativeDisplacement(const Sweep& a, const Sweep& b) {
+    return glm::vec3(a.displacement() - b.displacement());
+}
+
 /// An upper bound of how far a point of one body approaches a point of another in their sweeps.
 inline double maxApproach(const Sweep& a, double radiusOfA, const Sweep& b, double radiusOfB) {
     return glm::distance(a.displacement(), b.displacement()) + radiusOfA * a.angle() + radiusOfB * b.angle();

@@ -93,7 +93,8 @@ struct SweptPair {
             visitLeafShapes(b->object(), [&](const LeafShape& two) {
                 if (!one.field() && !two.field()) return;
                 const ContactShape ofTwo = contactShapeOf(*two.shape);
-                impact = earlier(impact, firstPenetration(one.swept(ofOne, a->sweep()), two.swept(ofTwo, b->sweep())));
+                const Penetration first = firstPenetration(one.swept(ofOne, a->sweep()), two.swept(ofTwo, b->sweep()));
+                impact = earlier(impact, first, relativeDisplacement(a->sweep(), b->sweep()));
             });
         });
     }
