@@ -288,8 +288,8 @@ kernel void initialiseParts(Frame frame, float far, global const int* directory,
     centres[centreOf(part, blocks)] = minValue < 0 ? -1 : 1;
 }
 
-// Propagates squared distances along one more axis: transformRow() of collider/field/coarse_distance.cpp. A work-item does
-// a coarse cell.
+// Propagates squared distances along one more axis: transformRow() of collider/field/coarse_distance.cpp. A work-item
+// does a coarse cell.
 kernel void transformParts(Frame frame, int axis, global const float* from, global float* to) {
     const int3 size = PARTS_ALONG * vload3(0, frame.blocks);
     const int3 part = ownPart();

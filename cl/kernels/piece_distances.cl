@@ -90,15 +90,16 @@ void applySample(NearestPieces* found, const Share* own, float3 sample, float re
     }
 }
 
-// Bounding cylinder of pieces relative to a block: BoundingCylinder of sdf/fill/bounding_cylinder.h. Values that depend on the slice
-// only are computed once.
+// Bounding cylinder of pieces relative to a block: BoundingCylinder of sdf/fill/bounding_cylinder.h. Values that depend
+// on the slice only are computed once.
 typedef struct {
     float3 centre, normal;
     float thickness, radius2;
     float px2[SLICES], height[SLICES];
 } BoundingCylinder;
 
-void makeCylinder(BoundingCylinder* cylinder, const Share* own, float3 centre, float radius, float3 normal, float thickness) {
+void makeCylinder(BoundingCylinder* cylinder, const Share* own, float3 centre, float radius, float3 normal,
+                  float thickness) {
     cylinder->centre = centre;
     cylinder->normal = normal;
     cylinder->thickness = thickness + BOUND_SLACK;
@@ -122,8 +123,8 @@ Column makeColumn(const BoundingCylinder* cylinder, int column) {
 }
 
 // Whether the cylinder may be nearest to some voxel of a chunk.
-bool mayBeNearest(const NearestPieces* found, const BoundingCylinder* cylinder, const Column* column, int slice, int chunk,
-                  bool thick) {
+bool mayBeNearest(const NearestPieces* found, const BoundingCylinder* cylinder, const Column* column, int slice,
+                  int chunk, bool thick) {
     const Lanes bound2 = found->nearest2[chunk], h = cylinder->height[slice] + column->height;
     Lanes excess = cylinder->px2[slice] + column->excess - bound2, g2 = h * h;
     if (thick) {
@@ -135,7 +136,8 @@ bool mayBeNearest(const NearestPieces* found, const BoundingCylinder* cylinder, 
 }
 
 // Bits of the chunks in a part of a share with a voxel that the cylinder may be nearest to.
-uint nearChunks(const NearestPieces* found, const Share* own, const Share* part, const BoundingCylinder* cylinder, bool thick) {
+uint nearChunks(const NearestPieces* found, const Share* own, const Share* part, const BoundingCylinder* cylinder,
+                bool thick) {
     uint near = 0;
     for (int c = part->firstColumn; c <= part->lastColumn; ++c) {
         const Column column = makeColumn(cylinder, c);

@@ -321,9 +321,10 @@ void makeCluster(const Groups* groups, uint index, global const Member* members)
     float radius = 0, thickness = 0;
     for (uint m = begin; m < end; ++m) {
         const float3 offset = vload3(0, members[m].position) - sample;
-        const float facing = dot(vload3(0, members[m].normal), normal), own = members[m].radius;
+        // by the cross product: near 1, the cosine is too coarse to give the sine
+        const float sine = length(cross(vload3(0, members[m].normal), normal)), own = members[m].radius;
         radius = max(radius, length(offset) + own);
-        thickness = max(thickness, fabs(dot(offset, normal)) + own * sqrt(max(0.0f, 1 - facing * facing)));
+        thickness = max(thickness, fabs(dot(offset, normal)) + own * sine);
     }
     storeGroup(groups, index, sample, radius + GROUP_SLACK, normal, thickness + GROUP_SLACK);
 }

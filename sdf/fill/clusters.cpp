@@ -66,10 +66,10 @@ void Clusters::addCluster(std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t m = begin; m < end; ++m) {
         const ClusterMember& member = members_[m];
         const glm::vec3 away = member.sample - sample;
-        const float facing = glm::dot(member.normal, normal);
+        // by the cross product: near 1, the cosine is too coarse to give the sine
+        const float sine = glm::length(glm::cross(member.normal, normal));
         radius = std::max(radius, glm::length(away) + member.radius);
-        thickness = std::max(thickness, std::abs(glm::dot(away, normal)) +
-                                            member.radius * std::sqrt(std::max(0.f, 1 - facing * facing)));
+        thickness = std::max(thickness, std::abs(glm::dot(away, normal)) + member.radius * sine);
     }
     clusters_.push_back({sample, radius + clusterSlack, normal, thickness + clusterSlack, begin, end});
 }

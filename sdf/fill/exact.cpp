@@ -16,6 +16,7 @@
 
 #include "sdf/base/progress.h"
 #include "sdf/fill/block_bins.h"
+#include "sdf/fill/certificate.h"
 #include "sdf/fill/clusters.h"
 #include "sdf/fill/triangle_bins.h"
 #include "sdf/sign/closest_side.h"
@@ -27,6 +28,12 @@ namespace {
 /// Maximum edge length of a piece [voxels]. Longer edges are halved, so that a piece stays near the blocks that query
 /// it and floats resolve its frame.
 constexpr double longestPieceEdge = 16;
+#ifdef BILAYER_VERIFY
+constexpr bool verifying = true;
+#else
+constexpr bool verifying = false;
+#endif
+
 /// Maximum count of paths that are tried before the winding number of the whole mesh.
 constexpr int maxPaths = 16;
 
@@ -58,6 +65,10 @@ class ExactBrickFiller {
         cut(brick);
         s_.clusters.build(s_.pieces, origin_);
         s_.bins.build(s_.clusters.clusters(), blocks_, job_.reach);
+        if constexpr (verifying) {
+            requireCovered(s_.pieces, s_.clusters.clusters(), s_.clusters.members(), origin_);
+            check_.emplace(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit_);
+        }
         s_.origins.clear();
         s_.distances.clear();
         s_.triangles.clear();
@@ -107,13 +118,14 @@ class ExactBrickFiller {
     void fillBlock(std::size_t number, const glm::ivec3& inBrick) {
         reaching_ = s_.bins.at(number);
         block_ = origin_ + inBrick;
-        if (reaching_.empty() || !wanted(block_, blockSide)) return;
+        if ((reaching_.empty() && !verifying) || !wanted(block_, blockSide)) return;
         job_.progress.poll();
         inBrick_ = inBrick;
-        if (!measureBlock({reaching_, s_.clusters.clusters().data(), s_.clusters.members().data(), s_.pieces.data(),
-                           block_, glm::vec3(inBrick), job_.reach},
-                          found_))
-            return;
+        const bool any = measureBlock({reaching_, s_.clusters.clusters().data(), s_.clusters.members().data(),
+                                       s_.pieces.data(), block_, glm::vec3(inBrick), job_.reach},
+                                      found_);
+        if constexpr (verifying) check_->require(block_, s_.pieces, found_, job_.reach);
+        if (!any) return;
         const std::size_t first = s_.distances.size();
         s_.origins.push_back(block_);
         s_.distances.resize(first + blockVoxels);
@@ -208,6 +220,7 @@ class ExactBrickFiller {
     FallbackSign& fallbackSign_;
     ExactBrickScratch& s_;
     std::size_t cut_ = 0;
+    std::optional<BlockCheck> check_;  ///< of the brick, while verifying
     ClosestSide side_;
     BlockDistances found_;
     std::vector<std::uint32_t> candidates_;
@@ -218,9 +231,14 @@ class ExactBrickFiller {
 
 }  // namespace
 
+bool exactIsVerified() {
+    return verifying;
+}
+
 void fillExact(const MeshJob& job, const Bounds& box) {
     const double voxelsPerUnit = 1.0 / double(job.voxelSize);
     const TriangleBins bins = binTriangles(job.mesh, box, voxelsPerUnit, job.reach, &job.progress);
+    if constexpr (verifying) requireCompleteBins(job.mesh, bins, voxelsPerUnit, job.reach);
     job.progress.begin(bins.count());
     FallbackSign fallbackSign(job);
     tbb::enumerable_thread_specific<ExactBrickScratch> scratch;

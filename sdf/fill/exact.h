@@ -13,4 +13,8 @@ namespace bilayer::detail {
 /// @param box  bounds of the mesh
 void fillExact(const MeshJob& job, const Bounds& box);
 
+/// Whether fillExact() checks its certificate for every voxel: the library is compiled with BILAYER_VERIFY. It then
+/// throws std::logic_error where an obligation does not hold.
+bool exactIsVerified();
+
 }  // namespace bilayer::detail
