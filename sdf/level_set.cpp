@@ -124,11 +124,13 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     sign_ = requireName(grid, metadata::sign, signs);
     requireSignOfMethod(grid, method_, sign_);
     signReason_ = meta<std::string>(grid, metadata::signReason, "");
-    for (const char* count : {metadata::signConflicts, metadata::signUndecided}) {
-        const auto value = meta<std::int64_t>(grid, count, 0);
-        require(value >= 0, grid, count, value, "0 or above");
-    }
-    signConflicts_ = std::uint64_t(meta<std::int64_t>(grid, metadata::signConflicts, 0));
+    const auto count = [&](const char* name) {
+        const auto value = meta<std::int64_t>(grid, name, 0);
+        require(value >= 0, grid, name, value, "0 or above");
+        return std::uint64_t(value);
+    };
+    signConflicts_ = count(metadata::signConflicts);
+    signUndecided_ = count(metadata::signUndecided);
     meshHash_ = std::uint64_t(meta<std::int64_t>(grid, metadata::meshHash, 0));
     const auto origin = meta<openvdb::Vec3d>(grid, metadata::origin, openvdb::Vec3d(0));
     origin_ = {origin.x(), origin.y(), origin.z()};
@@ -171,6 +173,9 @@ const std::string& LevelSet::signReason() const {
 }
 std::uint64_t LevelSet::signConflicts() const {
     return signConflicts_;
+}
+std::uint64_t LevelSet::signUndecided() const {
+    return signUndecided_;
 }
 float LevelSet::errorBound() const {
     return errorBound_;

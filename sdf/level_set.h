@@ -50,6 +50,9 @@ class LevelSet {
     const std::string& sign() const;
     const std::string& signReason() const;  ///< why it was selected, without a full stop: "closed and oriented"
     std::uint64_t signConflicts() const;    ///< count of voxels and neighbour pairs whose normals disagree
+    /// Count of voxels whose nearest normals cancel out; by layers: of voxels off the surface that are equally near to
+    /// both layers, counted by the processor only.
+    std::uint64_t signUndecided() const;
     /// Maximum error of the distances at active voxels [m]; infinity: not bounded; NaN: unknown.
     float errorBound() const;
     /// Times of the build that made the field; zeros for a field from a file.
@@ -61,7 +64,7 @@ class LevelSet {
   private:
     std::shared_ptr<const Grids> grids_;
     float exteriorWidth_, interiorWidth_, errorBound_;
-    std::uint64_t meshHash_, signConflicts_;
+    std::uint64_t meshHash_, signConflicts_, signUndecided_;
     std::string method_, sign_, signReason_;
     glm::dvec3 origin_;
 };

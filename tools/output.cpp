@@ -13,7 +13,6 @@
 #include <cstdio>
 
 #include "sdf/base/method_names.h"
-#include "sdf/base/openvdb.h"
 #include "sdf/io/atomic_file.h"
 
 namespace bilayer::tools {
@@ -215,15 +214,6 @@ void addRows(Table& table, const ReadReport& read) {
     for (const std::string& note : read.notes) table.row("note", note);
 }
 
-namespace {
-
-std::int64_t signUndecided(const LevelSet& levelSet) {
-    const auto entry = levelSet.grids().distance->getMetadata<openvdb::Int64Metadata>(metadata::signUndecided);
-    return entry ? entry->value() : 0;
-}
-
-}  // namespace
-
 void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
     const double size = levelSet.voxelSize();
     table.row("voxel size", metres(size));
@@ -239,9 +229,9 @@ void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
     table.row("sign", fmt::format("{}: {}", levelSet.sign(), levelSet.signReason()));
     if (levelSet.sign() == nameOf(Sign::normals))
         table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
-    if (const std::int64_t undecided = signUndecided(levelSet); undecided > 0 && levelSet.sign() == layerSigns)
+    if (levelSet.signUndecided() > 0 && levelSet.sign() == layerSigns)
         table.row("sign undecided",
-                  fmt::format("{} voxels are as near to one layer as to the other", grouped(std::uint64_t(undecided))));
+                  fmt::format("{} voxels are as near to one layer as to the other", grouped(levelSet.signUndecided())));
 }
 
 Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
@@ -249,7 +239,7 @@ Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
             {"sign", levelSet.sign()},
             {"signReason", levelSet.signReason()},
             {"signConflicts", levelSet.signConflicts()},
-            {"signUndecided", signUndecided(levelSet)},
+            {"signUndecided", levelSet.signUndecided()},
             {"errorBound", number(storedErrorBound(levelSet, stored))}};
 }
 

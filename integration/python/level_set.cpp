@@ -106,6 +106,7 @@ py::dict metadataOf(const LevelSet& levelSet) {
     all["sign"] = levelSet.sign();
     all["sign_reason"] = levelSet.signReason();
     all["sign_conflicts"] = levelSet.signConflicts();
+    all["sign_undecided"] = levelSet.signUndecided();
     all["error_bound"] = levelSet.errorBound();
     all["mesh_hash"] = levelSet.meshHash();
     all["build_seconds"] = times.total;

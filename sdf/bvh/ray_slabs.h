@@ -23,8 +23,8 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace {
 
-/// Min speed along an axis; at it, a ray stays between two planes for a billion slacks, which is beyond all boxes.
-constexpr float slowest = 1e-9f;
+/// Minimum speed along an axis; at it, a ray stays between two planes for a billion slacks, which is beyond all boxes.
+constexpr float minSpeed = 1e-9f;
 /// Tolerance for the rounding of a quotient.
 constexpr float quotientRoundUp = 1 + 1e-6f;
 
@@ -35,7 +35,7 @@ class RaySlabs {
     RaySlabs(const glm::vec3& origin, const glm::vec3& direction, float slack) {
         for (int k = 0; k < 3; ++k) {
             const bool down = direction[k] < 0;
-            perDirection_[k] = (down ? -1 : 1) / std::max(std::abs(direction[k]), slowest);
+            perDirection_[k] = (down ? -1 : 1) / std::max(std::abs(direction[k]), minSpeed);
             forward_[k] = !down;
             nearOrigin_[k] = origin[k] + (down ? -slack : slack);
             farOrigin_[k] = origin[k] - (down ? -slack : slack);

@@ -17,7 +17,7 @@ namespace bilayer::detail {
 struct FieldSigns {
     std::string name, reason;
     std::size_t conflicts = 0;  ///< voxels on both sides, and contradictory neighbour pairs
-    std::size_t undecided = 0;  ///< voxels whose nearest normals cancel out
+    std::size_t undecided = 0;  ///< voxels whose nearest normals cancel out, or that are equally near to both layers
 };
 
 /// Sets the name, transform and metadata of a distance grid.
