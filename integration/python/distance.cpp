@@ -77,6 +77,12 @@ py::object findImpact(const py::object& a, const py::object& poseA, const py::ob
     return result("Impact", impact.found, impact.fraction, impact.poseA, impact.poseB, toResult(impact.distance));
 }
 
+void requireIterable(const py::object& object, const char* name, const char* expected) {
+    if (!py::isinstance<py::iterable>(object))
+        throw std::invalid_argument(
+            fmt::format("{}: expected {}, got a '{}'", name, expected, Py_TYPE(object.ptr())->tp_name));
+}
+
 std::vector<const Collider*> collidersOf(const py::object& object, std::size_t count) {
     std::vector<const Collider*> colliders;
     if (py::isinstance<ColliderObject>(object)) {
@@ -97,10 +103,13 @@ std::vector<const Collider*> collidersOf(const py::object& object, std::size_t c
 
 py::object findDistances(const py::object& colliders, const py::object& poses, const py::object& pairs,
                          float maxDistance) {
+    requireIterable(poses, "poses", "a sequence of poses");
     std::vector<Pose> placements;
     for (const py::handle& pose : poses)
         placements.push_back(poseOf(py::reinterpret_borrow<py::object>(pose), "poses"));
-    const py::object keeper = py::isinstance<ColliderObject>(colliders) ? colliders : py::object(py::tuple(colliders));
+    const bool one = py::isinstance<ColliderObject>(colliders);
+    if (!one) requireIterable(colliders, "colliders", "a Collider or a sequence of them");
+    const py::object keeper = one ? colliders : py::object(py::tuple(colliders));
     const std::vector<const Collider*> bodies = collidersOf(keeper, placements.size());
     const std::vector<std::uint32_t> of = indices(pairs, "pairs", 2, bodies.size(), "a body");
     const DistanceOptions options = reachOf(maxDistance);

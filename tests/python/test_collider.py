@@ -127,6 +127,8 @@ def test_contact_options(collider):
         ({"scale_a": 0}, "scale_a"),
         ({"scale_b": float("nan")}, "scale_b"),
         ({"motion_a": [0, 0, 0]}, "motion_a: expected"),
+        ({"min_normal_cosine": np.nan}, "min_normal_cosine is nan"),
+        ({"min_normal_cosine_apart": np.nan}, "min_normal_cosine_apart is nan"),
         ({"motion_b": np.zeros((3, 2, 3))}, "motion_b: expected"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -276,3 +278,7 @@ def test_distances(collider, random):
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.distances(colliders, poses, bad)
+    with pytest.raises(ValueError, match="poses: expected a sequence of poses, got a 'int'"):
+        bilayer.distances(collider, 3, pairs)
+    with pytest.raises(ValueError, match="colliders: expected a Collider or a sequence of them, got a 'int'"):
+        bilayer.distances(3, poses, pairs)

@@ -88,8 +88,9 @@ corners = tilt.to_world(slab.vertices)
 axes.fill(*corners[corners[:, 2] > 0][[0, 1, 3, 2], :2].T, color="0.8")
 for time, pose in drawn:
     outline = pose.to_world(mesh.vertices[mesh.faces])[:, :, :2]
-    axes.tripcolor(*outline.reshape(-1, 2).T, np.arange(outline.shape[0] * 3).reshape(-1, 3),
-                   facecolors=np.full(outline.shape[0], np.sqrt(time)), vmin=0, vmax=np.sqrt(STEP * STEPS), cmap="viridis")
+    colours = np.full(len(outline), np.sqrt(time / (STEP * STEPS)))
+    axes.tripcolor(*outline.reshape(-1, 2).T, np.arange(3 * len(outline)).reshape(-1, 3), facecolors=colours,
+                   vmin=0, vmax=1, cmap="viridis")
 axes.plot(*np.array(track)[:, :2].T, "k-", linewidth=1)
 axes.set(aspect="equal", xlim=(-1.8, 1.8), title="the body at " + ", ".join(f"{time:.1f}" for time, _ in drawn) + " s")
 heights.plot(STEP * np.arange(STEPS), np.array(track)[:, 1])
