@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Preloaded by the benchmark `python`: sets the masks of Open3D's rays. Open3D 0.16 leaves them zero, which Embree takes
-// as "no geometry" where it is built with ray masks, as Debian's is. All rays would miss, and all points be outside.
+// Preloaded by the benchmark `python`: sets the masks of Open3D's rays. Open3D 0.16 leaves them zero, which Embree
+// takes as "no geometry" where it is built with ray masks, as Debian's is. All rays would miss, and all points be
+// outside.
 #include <dlfcn.h>
 #include <embree3/rtcore.h>
 
