@@ -20,14 +20,6 @@
 namespace bilayer::python {
 namespace {
 
-/// Options in errors of the library, and their names here.
-constexpr std::array<std::pair<const char*, const char*>, 5> optionNames{
-    {{"voxelSize", "voxel_size"},
-     {"exteriorWidthVoxels", "exterior_width_voxels"},
-     {"interiorWidthVoxels", "interior_width_voxels"},
-     {"gapVoxels", "gap_voxels"},
-     {"maxSubdivision", "max_subdivision"}}};
-
 // The keyword arguments of a call. Each is taken once; what is left at the end is unknown.
 class Keywords {
   public:
@@ -137,23 +129,11 @@ Request requestOf(const py::kwargs& given, const Mesh& mesh, const char* functio
     return request;
 }
 
-std::string withOptionNames(std::string message) {
-    for (const auto& [name, here] : optionNames) {
-        const std::size_t at = message.find(name);
-        if (at != std::string::npos) message.replace(at, std::string_view(name).size(), here);
-    }
-    return message;
-}
-
-// Runs a build that Ctrl-C cancels. Its errors name the options as they are named here.
+// Runs a build that Ctrl-C cancels.
 LevelSet run(Request& request, const std::function<LevelSet(const BuildOptions&)>& job) {
     return cancellable(request.progress, [&](const Listener& listener) {
         request.options.progress = listener;
-        try {
-            return job(request.options);
-        } catch (const std::invalid_argument& error) {
-            throw std::invalid_argument(withOptionNames(error.what()));
-        }
+        return job(request.options);
     });
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <stdexcept>
+#include <utility>
 
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
@@ -29,6 +30,9 @@ py::object findContacts(const py::object& a, const py::object& poseA, const py::
                         bool keepsObliqueEdges, bool reduced, LockedCache* cache) {
     if (!(margin >= 0) || !std::isfinite(margin))
         throw std::invalid_argument(fmt::format("margin is {}, and must be 0 or above", margin));
+    for (const auto& [value, name] :
+         {std::pair(minNormalCosine, "min_normal_cosine"), std::pair(minNormalCosineApart, "min_normal_cosine_apart")})
+        if (std::isnan(value)) throw std::invalid_argument(fmt::format("{} is nan, and must be a cosine", name));
     const PlacedShape first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");
     const ContactOptions options{.margin = margin,
                                  .exact = exact,

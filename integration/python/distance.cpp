@@ -62,16 +62,25 @@ py::object findDistance(const py::object& a, const py::object& poseA, const py::
 }
 
 py::object findImpact(const py::object& a, const py::object& poseA, const py::object& motionA, const py::object& b,
-                      const py::object& poseB, const py::object& motionB, float scaleA, float scaleB, float tolerance) {
+                      const py::object& poseB, const py::object& motionB, float scaleA, float scaleB, float tolerance,
+                      bool penetration) {
     const PlacedShape first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");
     if (!(tolerance >= 0) || !std::isfinite(tolerance))
         throw std::invalid_argument(fmt::format("tolerance is {}, and must be 0 or above, and finite", tolerance));
+    if (penetration && tolerance > 0)
+        throw std::invalid_argument(fmt::format("tolerance is {}, and must be 0 with penetration=True", tolerance));
     Impact impact;
     {
         const py::gil_scoped_release release;
-        impact = timeOfImpact(first, second, {tolerance});
+        impact = timeOfImpact(first, second, {.tolerance = tolerance, .penetration = penetration});
     }
     return result("Impact", impact.found, impact.fraction, impact.poseA, impact.poseB, toResult(impact.distance));
+}
+
+void requireIterable(const py::object& object, const char* name, const char* expected) {
+    if (!py::isinstance<py::iterable>(object))
+        throw std::invalid_argument(
+            fmt::format("{}: expected {}, got a '{}'", name, expected, Py_TYPE(object.ptr())->tp_name));
 }
 
 std::vector<const Collider*> collidersOf(const py::object& object, std::size_t count) {
@@ -94,10 +103,13 @@ std::vector<const Collider*> collidersOf(const py::object& object, std::size_t c
 
 py::object findDistances(const py::object& colliders, const py::object& poses, const py::object& pairs,
                          float maxDistance) {
+    requireIterable(poses, "poses", "a sequence of poses");
     std::vector<Pose> placements;
     for (const py::handle& pose : poses)
         placements.push_back(poseOf(py::reinterpret_borrow<py::object>(pose), "poses"));
-    const py::object keeper = py::isinstance<ColliderObject>(colliders) ? colliders : py::object(py::tuple(colliders));
+    const bool one = py::isinstance<ColliderObject>(colliders);
+    if (!one) requireIterable(colliders, "colliders", "a Collider or a sequence of them");
+    const py::object keeper = one ? colliders : py::object(py::tuple(colliders));
     const std::vector<const Collider*> bodies = collidersOf(keeper, placements.size());
     const std::vector<std::uint32_t> of = indices(pairs, "pairs", 2, bodies.size(), "a body");
     const DistanceOptions options = reachOf(maxDistance);
@@ -146,7 +158,8 @@ poses.
 )";
 
 constexpr const char* impactDoc =
-    R"(time_of_impact(a, pose_a, motion_a, b, pose_b, motion_b, *, scale_a=1, scale_b=1, tolerance=0) -> Impact
+    R"(time_of_impact(a, pose_a, motion_a, b, pose_b, motion_b, *, scale_a=1, scale_b=1, tolerance=0,
+               penetration=False) -> Impact
 
 When two bodies touch that move from their poses by their motions, at constant velocities. They do not touch before,
 whatever their speed and however thin they are.
@@ -155,9 +168,13 @@ a, b: Collider or Shape, one of them a Collider. pose_a, pose_b: a Pose, a matri
 motion_a, motion_b: displacement, and rotation vector [rad] about the pose's position, shape (2, 3); None for a body at
 rest.
 tolerance: bodies touch at this separation, in the meshes' unit; 0 for a twentieth of the smaller voxel.
+penetration: find the first penetration instead of the first touch. Bodies may start in contact, and rest, slide and
+roll on each other. A point penetrates that gets more than a third of the smaller voxel into the other body, or deeper
+than it starts. Points are those of the surface samples; what passes between them is not seen.
 
 found: bool, False if they do not touch in the whole motion; the other members are then invalid. fraction: float, of the
-motion until they touch, 0 to 1. pose_a, pose_b: Pose, then. distance: BodyDistance, then.
+motion until they touch, 0 to 1. pose_a, pose_b: Pose, then. distance: BodyDistance, then; of a penetration only
+its place and normal count.
 
 Raises ValueError that names the argument, for rotations by more than 1000 rad, and for planes and triangles that
 rotate.
@@ -168,6 +185,9 @@ rotate.
 >>> impact = bilayer.time_of_impact(body, bilayer.Pose((5, 0, 0)), [[-8, 0, 0], [0, 0, 0]], body, None, None)
 >>> round(impact.fraction, 2), impact.pose_a.position.round(1).tolist()
 (0.5, [1.0, 0.0, 0.0])
+>>> aside = ([[0, 2, 0], [0, 0, 0]], body, None, None)  # from a body that it touches
+>>> bilayer.time_of_impact(body, bilayer.Pose((1, 0, 0)), *aside, penetration=True).found
+False
 )";
 
 }  // namespace
@@ -180,7 +200,7 @@ void addDistance(py::module_& module) {
                distancesDoc);
     module.def("time_of_impact", findImpact, py::arg("a"), py::arg("pose_a"), py::arg("motion_a"), py::arg("b"),
                py::arg("pose_b"), py::arg("motion_b"), py::kw_only(), py::arg("scale_a") = 1.f,
-               py::arg("scale_b") = 1.f, py::arg("tolerance") = 0.f, impactDoc);
+               py::arg("scale_b") = 1.f, py::arg("tolerance") = 0.f, py::arg("penetration") = false, impactDoc);
 }
 
 }  // namespace bilayer::python

@@ -2,8 +2,8 @@
 // usage: test_python_answers MESH VOXEL_SIZE POINTS ANSWERS
 // The library's answers to the float32 points of a file, without Python: samples, closest points, rays from each point
 // to zero, sphere casts of radius 0.1 along them, inside tests; contacts of the body with itself one voxel aside,
-// distance of the body from itself, three units along x, and the time of impact on the way back; volume and particles
-// of the field. All are written as float32.
+// distance of the body from itself, three units along x, and the times of impact and of penetration on the way back;
+// volume and particles of the field. All are written as float32.
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -68,7 +68,9 @@ void answer(const Mesh& mesh, float voxelSize, const std::vector<glm::vec3>& poi
     for (const Contact& contact : contacts)
         file.add(contact.position), file.add(contact.normal), file.add(contact.distance);
     file.add(distance({collider, {{3, 0, 0}}}, {collider, {}}).distance);
-    file.add(timeOfImpact({collider, {{3, 0, 0}}, 1, {{-3, 0, 0}, {0, 0, 1}}}, {collider, {}}).fraction);
+    const Placed thrown{collider, {{3, 0, 0}}, 1, {{-3, 0, 0}, {0, 0, 1}}}, ground{collider, {}};
+    file.add(timeOfImpact(thrown, ground).fraction);
+    file.add(timeOfImpact(thrown, ground, {.penetration = true}).fraction);
     file.add(float(massProperties(levelSet).volume));
     for (const glm::vec3& point : fluid::particles(*levelSet.grids().distance).positions) file.add(point);
 }

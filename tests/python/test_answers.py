@@ -24,7 +24,8 @@ def answers_here(mesh, points):
     contacts = bilayer.collide(collider, bilayer.Pose((VOXEL_SIZE, 0, 0)), collider, None, margin=VOXEL_SIZE)
     there = bilayer.Pose((3, 0, 0))
     apart = bilayer.distance(collider, there, collider, None)
-    impact = bilayer.time_of_impact(collider, there, [[-3, 0, 0], [0, 0, 1]], collider, None, None)
+    thrown = (collider, there, [[-3, 0, 0], [0, 0, 1]], collider, None, None)
+    times = [bilayer.time_of_impact(*thrown, penetration=deeper).fraction for deeper in (False, True)]
     hits, spheres = field.raycast(points, -points), field.sphere_cast(points, -points, 0.1)
     return np.concatenate(
         [
@@ -32,7 +33,7 @@ def answers_here(mesh, points):
             np.column_stack([closest.distance, closest.position, closest.normal]).ravel(),
             np.column_stack([hits.distance, spheres.distance, hits.triangle, field.inside(points)]).ravel(),
             np.column_stack([contacts.position, contacts.normal, contacts.distance]).ravel(),
-            np.float32([apart.distance, impact.fraction, bilayer.mass_properties(level_set).volume]),
+            np.float32([apart.distance, *times, bilayer.mass_properties(level_set).volume]),
             bilayer.particles(level_set).ravel(),
         ]
     )

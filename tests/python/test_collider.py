@@ -127,6 +127,8 @@ def test_contact_options(collider):
         ({"scale_a": 0}, "scale_a"),
         ({"scale_b": float("nan")}, "scale_b"),
         ({"motion_a": [0, 0, 0]}, "motion_a: expected"),
+        ({"min_normal_cosine": np.nan}, "min_normal_cosine is nan"),
+        ({"min_normal_cosine_apart": np.nan}, "min_normal_cosine_apart is nan"),
         ({"motion_b": np.zeros((3, 2, 3))}, "motion_b: expected"),
     ):
         with pytest.raises(ValueError, match=message):
@@ -180,9 +182,32 @@ def test_time_of_impact(collider):
         ((collider, there, None, collider, None, [[0, 0, 0], [0, 0, 2000]]), {}, "rad"),
         ((collider, there, None, collider, None, None), {"tolerance": -1}, "tolerance is -1"),
         ((collider, there, None, collider, None, None), {"scale_b": 0}, "scale_b"),
+        (
+            (collider, there, None, collider, None, None),
+            {"tolerance": 0.5, "penetration": True},
+            "tolerance is 0.5, and must be 0 with penetration=True",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.time_of_impact(*arguments, **options)
+
+
+def test_time_of_penetration(collider):
+    voxel = collider.field.voxel_size
+    resting = bilayer.Pose((2, 0, 0))
+
+    def found(motion, pose=resting, penetration=True):
+        motion_a = [motion, [0, 0, 0]]
+        return bilayer.time_of_impact(collider, pose, motion_a, collider, None, None, penetration=penetration)
+
+    for motion in ((0, 1.5, 0), (0, 0, -1.5), (1, 0, 0), (0, 0, 0)):  # slides, parts, rests
+        assert found(motion, penetration=False).fraction == 0  # a touch
+        assert not found(motion).found
+    into = found((-1, 0.2, 0))
+    assert into.found and into.pose_a.position[0] == pytest.approx(2, abs=voxel / 2)
+    assert abs(into.distance.normal[0]) == pytest.approx(1, abs=1e-3)
+    fast = found((-100, 0, 0), bilayer.Pose((50, 0.1, 0.2)))
+    assert fast.found and 2 - 1e-4 <= fast.pose_a.position[0] <= 2 + voxel / 2
 
 
 SHAPES = [
@@ -253,3 +278,7 @@ def test_distances(collider, random):
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.distances(colliders, poses, bad)
+    with pytest.raises(ValueError, match="poses: expected a sequence of poses, got a 'int'"):
+        bilayer.distances(collider, 3, pairs)
+    with pytest.raises(ValueError, match="colliders: expected a Collider or a sequence of them, got a 'int'"):
+        bilayer.distances(3, poses, pairs)

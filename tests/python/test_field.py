@@ -121,7 +121,7 @@ def test_rays_are_broadcast(box_field):
     hits = box_field.raycast([[[5, 0, 0]], [[6, 0, 0]]], [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
     assert hits.hit.shape == (2, 3) and hits.position.shape == (2, 3, 3)
     assert hits.distance.tolist() == [[4, INFINITY, INFINITY], [5, INFINITY, INFINITY]]
-    with pytest.raises(ValueError, match=r"directions: shape \(2,\) does not fit origins of shape \(3,\)"):
+    with pytest.raises(ValueError, match=r"directions: leading shape \(2,\) does not fit origins of leading shape \(3,\)"):
         box_field.raycast(np.ones((3, 3)), np.ones((2, 3)))
 
 

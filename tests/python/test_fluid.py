@@ -64,7 +64,7 @@ def test_particles(tank):
     moved = bilayer.particles(field, bilayer.Pose((5, 0, 0)), scale=2, voxel_size=0.05)
     assert np.linalg.norm(moved - [5, 0, 0], axis=1).max() <= 0.6 + 1e-5
     for arguments, message in (
-        ({"per_voxel": 0}, "per"),
+        ({"per_voxel": 0}, "per_voxel must be in 1..1000"),
         ({"pose": bilayer.Pose()}, "pose and voxel_size"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -206,7 +206,7 @@ def test_meshes_of_other_packages(box):
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 1, 0), (1, np.nan, 1), "big"])
 def test_bad_boxes(size):
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="size: expected three lengths above 0, got"):
         bilayer.box(size)
 
 
@@ -214,6 +214,6 @@ def test_spheres():
     mesh = bilayer.sphere(2, subdivisions=4)
     assert np.allclose(np.linalg.norm(mesh.vertices, axis=1), 2)
     assert bilayer.inspect(mesh).verdict == "closed and oriented"
-    for radius, subdivisions in ((0, 1), (np.inf, 1), (1, 10), (1, -1)):
-        with pytest.raises(ValueError):
+    for radius, subdivisions in ((0, 1), (np.inf, 1), (1, 10), (1, -1), ("x", 1), (1, 2.5)):
+        with pytest.raises(ValueError, match="radius is|subdivisions is"):
             bilayer.sphere(radius, subdivisions)

@@ -311,6 +311,7 @@ def time_of_impact(
     scale_a: float = 1,
     scale_b: float = 1,
     tolerance: float = 0,
+    penetration: bool = False,
 ) -> Impact: ...
 def seed(
     liquid: LevelSet,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from numbers import Integral, Real
 from typing import Any, Sequence
 
 import numpy as np
@@ -81,7 +82,10 @@ def box(size: Sequence[float] = (1, 1, 1)) -> Mesh:
     >>> bilayer.box((2, 4, 6)).bounds.tolist()
     [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]]
     """
-    lengths = np.asarray(size, dtype=float)
+    try:
+        lengths = np.asarray(size, dtype=float)
+    except (TypeError, ValueError):
+        lengths = np.empty(0)
     if lengths.shape != (3,) or not np.all(lengths > 0) or not np.all(np.isfinite(lengths)):
         raise ValueError(f"size: expected three lengths above 0, got {size!r}")
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -101,10 +105,10 @@ def sphere(radius: float = 1, subdivisions: int = 3) -> Mesh:
     >>> bilayer.sphere(2, subdivisions=1)
     Mesh(18 vertices, 32 faces)
     """
-    if not (radius > 0 and np.isfinite(radius)):
-        raise ValueError(f"radius is {radius!r}, and must be above 0 and finite")
-    if not 0 <= subdivisions <= 9:
-        raise ValueError(f"subdivisions is {subdivisions!r}, and must be 0 to 9")
+    if not (isinstance(radius, Real) and radius > 0 and np.isfinite(radius)):
+        raise ValueError(f"radius is {radius!r}, and must be a number above 0 and finite")
+    if not (isinstance(subdivisions, Integral) and 0 <= subdivisions <= 9):
+        raise ValueError(f"subdivisions is {subdivisions!r}, and must be an integer of 0 to 9")
     vertices = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
     faces = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
     for _ in range(subdivisions):

@@ -61,7 +61,7 @@ figure, panels = plt.subplots(1, 2, figsize=(12, 5.5))
 for axes, chosen, title in ((panels[0], slice(0, NEAR), "near the surface"), (panels[1], slice(NEAR, None), "uniform")):
     here = points[chosen]
     slab = np.abs(here[:, 2]) < 0.04
-    shown = axes.scatter(*here[slab][:, :2].T, c=distance[chosen][slab], s=3, cmap="RdBu_r", vmin=-0.1, vmax=0.1)
+    shown = axes.scatter(*here[slab][:, :2].T, c=distance[chosen][slab], s=3, cmap="coolwarm", vmin=-0.1, vmax=0.1)
     axes.set(aspect="equal", xlim=(-0.75, 0.75), ylim=(-0.75, 0.75), title=f"{title}, |z| < 0.04")
 figure.colorbar(shown, ax=panels, label="signed distance", shrink=0.8)
 save(figure, given.output)
