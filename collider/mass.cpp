@@ -10,9 +10,11 @@
 #include <limits>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "collider/field/jacobi_rotation.h"
 #include "collider/field/moments.h"
+#include "sdf/mesh/unite.h"
 
 namespace bilayer {
 
@@ -27,21 +29,40 @@ struct Integrals : Moments {
     double area = 0;
 };
 
-// Integrals over the tetrahedra between `centre`, which becomes the origin, and the triangles.
-Integrals integrate(const Mesh& mesh, const glm::dvec3& centre) {
+// Integrals over the tetrahedra between `centre`, which becomes the origin, and the triangles. A triangle that has
+// copies counts as one part of their count; without counts, triangles have no copies.
+Integrals integrate(const Mesh& mesh, const std::vector<int>& copies, const glm::dvec3& centre) {
     Integrals sum;
-    for (const glm::uvec3& t : mesh.triangles) {
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const glm::uvec3& t = mesh.triangles[i];
         const glm::dvec3 a = glm::dvec3(mesh.points[t.x]) - centre, b = glm::dvec3(mesh.points[t.y]) - centre,
                          c = glm::dvec3(mesh.points[t.z]) - centre, s = a + b + c;
-        const double det = glm::dot(a, glm::cross(b, c));
+        const double part = copies.empty() ? 1 : 1.0 / copies[i], det = part * glm::dot(a, glm::cross(b, c));
         sum.volume += det / 6;
         sum.first += det / 24 * s;
         sum.second +=
             det / 120 *
             (glm::outerProduct(a, a) + glm::outerProduct(b, b) + glm::outerProduct(c, c) + glm::outerProduct(s, s));
-        sum.area += glm::length(glm::cross(b - a, c - a)) / 2;
+        sum.area += part * glm::length(glm::cross(b - a, c - a)) / 2;
     }
     return sum;
+}
+
+MassProperties massOf(const Mesh& mesh, const std::vector<int>& copies) {
+    const Bounds box = bounds(mesh);
+    const glm::dvec3 origin = 0.5 * (glm::dvec3(box.lower) + glm::dvec3(box.upper));
+    Integrals sum = integrate(mesh, copies, origin);
+    if (!(std::abs(sum.volume) > minThickness * sum.area * double(box.longestSide())))
+        throw std::invalid_argument("mass properties: the mesh encloses no volume");
+    if (sum.volume < 0) {
+        sum.volume = -sum.volume;
+        sum.first = -sum.first;
+        sum.second = -sum.second;
+    }
+    const MassProperties result = massProperties(sum, origin);
+    if (!(result.principalInertia.x > 0))
+        throw std::invalid_argument("mass properties: the mesh does not bound a solid");
+    return result;
 }
 
 struct Eigen {
@@ -102,22 +123,15 @@ MassProperties detail::massProperties(const Moments& moments, const glm::dvec3& 
     return result;
 }
 
+MassProperties detail::unionMass(const Mesh& closed) {
+    const LabelledMesh boundary = unionBoundary(closed);
+    if (boundary.mesh.triangles.empty()) throw std::invalid_argument("mass properties: the mesh encloses no volume");
+    return massOf(boundary.mesh, boundary.labels);
+}
+
 MassProperties massProperties(const Mesh& mesh) {
     validate(mesh);
-    const Bounds box = bounds(mesh);
-    const glm::dvec3 origin = 0.5 * (glm::dvec3(box.lower) + glm::dvec3(box.upper));
-    Integrals sum = integrate(mesh, origin);
-    if (!(std::abs(sum.volume) > minThickness * sum.area * double(box.longestSide())))
-        throw std::invalid_argument("mass properties: the mesh encloses no volume");
-    if (sum.volume < 0) {
-        sum.volume = -sum.volume;
-        sum.first = -sum.first;
-        sum.second = -sum.second;
-    }
-    const MassProperties result = massProperties(sum, origin);
-    if (!(result.principalInertia.x > 0))
-        throw std::invalid_argument("mass properties: the mesh does not bound a solid");
-    return result;
+    return massOf(mesh, {});
 }
 
 }  // namespace bilayer

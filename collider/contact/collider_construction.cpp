@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "collider/contact/collider_data.h"
+#include "collider/field/moments.h"
 #include "sdf/base/method_names.h"
-#include "sdf/mesh/topology.h"
 #include "sdf/sign/fill_holes.h"
 #include "sdf/sign/sign_choice.h"
 
@@ -29,23 +29,13 @@ std::uint64_t nextId() {
     return ++made;
 }
 
-Mesh withoutCopies(Mesh mesh) {
-    const Topology topology(mesh);
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
-        if (topology.original[i] == i) mesh.triangles[kept++] = mesh.triangles[i];
-    mesh.triangles.resize(kept);
-    return mesh;
-}
-
-// Mass properties of the mesh if it is closed, otherwise of the field's interior. A solid whose faces were all
-// duplicated back to back has twice its volume in an outward-facing mesh; duplicates are dropped first.
-std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet) {
+// Mass properties of a closed mesh's union, otherwise of the field's interior, which a flood may have widened.
+std::optional<MassProperties> massOf(const Mesh& oriented, const LevelSet& levelSet) {
     try {
-        if (!balanced(mesh)) return massProperties(levelSet);
-        if (levelSet.sign() == "normals" && levelSet.signReason() != closedAndOriented)
-            if (const Mesh once = withoutCopies(mesh); balanced(once)) return massProperties(once);
-        return massProperties(mesh);
+        if (!balanced(oriented) || levelSet.sign() == nameOf(Sign::flood)) return massProperties(levelSet);
+        // neither intersects itself nor has copies
+        const bool isSimple = levelSet.sign() == nameOf(Sign::normals) && levelSet.signReason() == closedAndOriented;
+        return isSimple ? massProperties(oriented) : unionMass(oriented);
     } catch (const std::invalid_argument&) {
         return std::nullopt;  // an open surface: it can only be static
     }
@@ -81,9 +71,9 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
     if (options.margin > maxMargin * levelSet.voxelSize())
         throw std::invalid_argument(
             fmt::format("collider: a margin of {:g} m is wider than {} voxels", options.margin, maxMargin));
-    Mesh outward = outwardMesh(levelSet, std::move(given));
-    auto mass = massOf(outward, levelSet);
-    Filled filled = filledMesh(std::move(outward), levelSet);
+    Mesh oriented = orientedMesh(levelSet, std::move(given));
+    auto mass = massOf(oriented, levelSet);
+    Filled filled = filledMesh(outerSurface(levelSet, std::move(oriented)), levelSet);
     const auto mesh = std::make_shared<const Mesh>(std::move(filled.mesh));
     return {.points = SurfacePoints(*mesh, options.pointSpacingVoxels * levelSet.voxelSize()),
             .bounds = bounds(*mesh),

@@ -35,4 +35,11 @@ struct Moments {
 /// From moments about `origin` with a positive volume [m].
 MassProperties massProperties(const Moments& moments, const glm::dvec3& origin);
 
+/// Mass properties of the union of a closed mesh's solids: of the points whose winding number is above 1/2. Exact up to
+/// the rounding of floats, also where solids intersect or lie flush. Takes longer than massProperties(), which counts
+/// intersections twice.
+/// @param closed  balanced()
+/// Throws as massProperties() does.
+MassProperties unionMass(const Mesh& closed);
+
 }  // namespace bilayer::detail

@@ -46,6 +46,16 @@ struct BoxLanes {
         return hn::And(x, hn::And(y, z));
     }
 
+    // Tests whether both boxes lie in one plane across an axis, and thus all triangles in them.
+    Mask share(const BoxLanes& o) const {
+        const auto flat = [](Vec low, Vec otherLow, Vec high, Vec otherHigh) {
+            return hn::Eq(hn::Min(low, otherLow), hn::Max(high, otherHigh));
+        };
+        return hn::Or(
+            flat(lower.x, o.lower.x, upper.x, o.upper.x),
+            hn::Or(flat(lower.y, o.lower.y, upper.y, o.upper.y), flat(lower.z, o.lower.z, upper.z, o.upper.z)));
+    }
+
     static Vec smallest(Vec a, Vec b, Vec c) { return hn::Min(a, hn::Min(b, c)); }
     static Vec largest(Vec a, Vec b, Vec c) { return hn::Max(a, hn::Max(b, c)); }
 };
@@ -54,8 +64,9 @@ struct BoxLanes {
 struct Planes {
     PointLanes origin, normal, sizes;  // `sizes`: absolute values of the products in the normal
 
-    explicit Planes(const PointLanes* c) : origin(c[0]) {
-        const PointLanes u = c[1] - c[0], v = c[2] - c[0];
+    explicit Planes(const PointLanes* c) : Planes(c[0], c[1] - c[0], c[2] - c[0]) {}
+    // Through a point, along two directions.
+    Planes(const PointLanes& origin, const PointLanes& u, const PointLanes& v) : origin(origin) {
         const auto products = [](Vec a, Vec b, Vec c, Vec d, Vec& difference, Vec& size) {
             const Vec first = hn::Mul(a, b), second = hn::Mul(c, d);
             difference = hn::Sub(first, second);
@@ -88,6 +99,28 @@ struct Planes {
         return hn::Or(hn::And(above[0], hn::And(above[1], above[2])), hn::And(below[0], hn::And(below[1], below[2])));
     }
 };
+
+// Tests whether a plane through an edge of each first triangle, along its normal, has the triangles on two sides,
+// except for vertices on that edge. Triangles that lie next to each other in about one plane are separated in this way.
+Mask separatedAtEdges(const PointLanes* first, const PointLanes* second, const Mask* shared) {
+    const PointLanes normal = Planes(first).normal;
+    Mask separated = hn::FirstN(Tag(), 0);
+    for (int k = 0; k < 3; ++k) {
+        const PointLanes &from = first[k], &to = first[(k + 1) % 3], &opposite = first[(k + 2) % 3];
+        const Planes plane(from, to - from, normal);
+        Mask inAbove, inBelow;
+        plane.sides(opposite, inAbove, inBelow);
+        for (int i = 0; i < 3; ++i) {
+            Mask above, below;
+            plane.sides(second[i], above, below);
+            // a shared vertex is on the edge, or certainly on the side of the opposite corner
+            inBelow = hn::And(inBelow, hn::Or(above, hn::AndNot(below, shared[i])));
+            inAbove = hn::And(inAbove, hn::Or(below, hn::AndNot(above, shared[i])));
+        }
+        separated = hn::Or(separated, hn::Or(inAbove, inBelow));
+    }
+    return separated;
+}
 
 // The triangles of a leaf, or as many as a vector holds.
 struct Lanes {
@@ -128,7 +161,11 @@ struct Others {
         const Mask edge = hn::Or(hn::And(mine[0], hn::Or(mine[1], mine[2])), hn::And(mine[1], mine[2]));
         mask = hn::AndNot(hn::Or(edge, Planes(other).separates(lanes.corners, mine)), mask);
         if (hn::AllFalse(Tag(), mask)) return mask;
-        return hn::AndNot(planes.separates(other, its), mask);
+        mask = hn::AndNot(planes.separates(other, its), mask);
+        if (hn::AllFalse(Tag(), mask)) return mask;
+        mask = hn::AndNot(separatedAtEdges(lanes.corners, other, its), mask);
+        if (hn::AllFalse(Tag(), mask)) return mask;
+        return hn::AndNot(separatedAtEdges(other, lanes.corners, mine), mask);
     }
 };
 
@@ -158,7 +195,7 @@ class LeafPairs {
         const BoxGroup& group = tree_.boxes().group(node);
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
             const BoxLanes boxes(loadLanes(Tag(), group.lower, lane), loadLanes(Tag(), group.upper, lane));
-            for (unsigned bits = bitsOf(boxes.meet(own)); bits != 0; bits &= bits - 1) {
+            for (unsigned bits = bitsOf(hn::AndNot(boxes.share(own), boxes.meet(own))); bits != 0; bits &= bits - 1) {
                 const std::size_t place = lane + std::size_t(std::countr_zero(bits));
                 const std::uint32_t child = group.firstChild + std::uint32_t(place);
                 if (!tree_.boxes().isLeaf(child))
@@ -200,7 +237,8 @@ class LeafPairs {
     }
 
     void take(const Others& others, const TriangleLeaf& leaf, std::size_t lane, std::size_t i, Mask near, bool same) {
-        Mask mask = hn::And(near, others.lanes.boxes.meet({pointAt(lower_, i), pointAt(upper_, i)}));
+        const BoxLanes box(pointAt(lower_, i), pointAt(upper_, i)), &boxes = others.lanes.boxes;
+        Mask mask = hn::AndNot(boxes.share(box), hn::And(near, boxes.meet(box)));
         if (hn::AllFalse(Tag(), mask)) return;
         const PointLanes corners[3] = {pointAt(leaf_.corners[0], i), pointAt(leaf_.corners[1], i),
                                        pointAt(leaf_.corners[2], i)};

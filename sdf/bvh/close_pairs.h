@@ -12,9 +12,11 @@
 namespace bilayer::detail {
 
 /// Pairs the triangles of a leaf with each other and with those of later leaves. All leaves together yield each pair of
-/// the mesh once. A pair is omitted in three cases:
+/// the mesh once. A pair is omitted in these cases:
 /// - its boxes do not overlap,
+/// - its boxes lie in one plane across an axis,
 /// - its triangles share an edge,
+/// - a plane through an edge of one triangle certainly separates them, except for shared vertices,
 /// - one triangle certainly lies on one side of the other's plane, except for shared vertices.
 /// @param welded  the tree's mesh, in which triangles share vertices by index
 /// @param pairs   overwritten; in each pair, the triangle of `leaf` comes first

@@ -21,6 +21,8 @@ namespace {
 constexpr std::size_t leafTriangles = 12;
 /// An expansion with a larger error bound is not used: the node is opened. This also keeps the sums of errors accurate.
 constexpr double uselessError = 10;
+/// An estimate of an integer with a smaller error rounds to it: a half, less a margin for rounding.
+constexpr double surelyNearest = 0.49;
 
 double determinant(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     return glm::dot(a, glm::cross(b, c));
@@ -216,6 +218,14 @@ WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point, double 
         sum.error -= worst.estimate.error;
         refine(nodes_[worst.node], worst.node, point, sum, open);
     }
+}
+
+// A first estimate bounds the true number's difference from 1/2. The second one then has an error below a half.
+int WindingNumber::nearestInteger(const glm::dvec3& point) const {
+    const Estimate first = estimate(point, onlySide);
+    const double range = std::abs(first.value - 0.5) + first.error;
+    const Estimate second = first.error < surelyNearest ? first : estimate(point, surelyNearest / (range + 1));
+    return int(std::lround(second.value));
 }
 
 void WindingNumber::refine(const Node& node, std::uint32_t at, const glm::dvec3& point, Estimate& sum,

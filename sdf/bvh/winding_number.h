@@ -43,6 +43,9 @@ class WindingNumber {
     /// Returns whether the winding number at a point [m] is above one half. Refines less than estimate().
     bool isInside(const glm::dvec3& point) const { return estimate(point, onlySide).value > 0.5; }
 
+    /// Returns the winding number at a point [m], rounded to an integer. Meant for closed meshes.
+    int nearestInteger(const glm::dvec3& point) const;
+
     /// Returns whether any triangle intersects or touches the segment between two points [m].
     bool meets(const glm::dvec3& from, const glm::dvec3& to) const;
 

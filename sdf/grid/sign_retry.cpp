@@ -19,13 +19,23 @@ bool isKnownToIntersectItself(const BuildOptions& options) {
     return options.inspected && options.inspected->selfIntersections > 0;
 }
 
-// Returns whether normals fail to give signs: they contradict each other, or cancel out on coincident faces with
-// opposite orientations. If such faces have different diagonals, they share no triangle, but winding numbers find no
-// volume between them.
-bool contradictory(const FieldSigns& signs, const Mesh& mesh, Progress& progress) {
-    if (signs.conflicts > 0) return true;
-    if (signs.undecided == 0 || foldsBack(mesh, &progress)) return false;
-    return hasFacesBackToBack(mesh, &progress) || chooseSignOfSolid(mesh, &progress).sign == Sign::flood;
+// Returns another sign method if normals fail to give signs: they contradict each other, or cancel out on coincident
+// faces with opposite orientations.
+// - At the rim of a double-sided open surface, such faces share an edge. The surface encloses nothing, and its normals
+//   stay. If it is closed but for small holes, it is a solid whose every face exists twice, and orient() flips one
+//   half.
+// - If the two copies have different diagonals, they share no triangle, but winding numbers find no volume between
+// them.
+std::optional<SignChoice> otherChoice(const FieldSigns& signs, const Mesh& mesh, Progress& progress) {
+    if (signs.conflicts > 0) return chooseSignAfterConflict(mesh, &progress);
+    if (signs.undecided == 0) return std::nullopt;
+    const bool folds = foldsBack(mesh, &progress);
+    const bool isDoubled =
+        hasFacesBackToBack(mesh, &progress) || (!folds && chooseSignOfSolid(mesh, &progress).sign == Sign::flood);
+    if (!isDoubled) return std::nullopt;
+    SignChoice other = chooseSignAfterConflict(mesh, &progress);
+    const bool isSolid = other.repaired && other.sign != Sign::flood;
+    return folds && !isSolid ? std::nullopt : std::optional(std::move(other));
 }
 
 }  // namespace
@@ -46,11 +56,12 @@ void fillWithAutomaticSign(FieldFiller& filler) {
         const Mesh& mesh = repaired ? *repaired : filler.mesh();
         const bool borrows = choice.sign == Sign::normals && method == Method::pseudonormal;
         const Sign sign = filler.fill(mesh, choice.sign, choice.reason, borrows ? Method::exact : method);
-        if (sign != Sign::normals || !contradictory(filler.signs(), mesh, progress)) {
+        auto other = sign == Sign::normals ? otherChoice(filler.signs(), mesh, progress) : std::nullopt;
+        if (!other) {
             if (borrows && sign == Sign::normals) filler.fillWithSidesOfLast(mesh, choice.reason);
             return;
         }
-        choice = chooseSignAfterConflict(mesh, &progress);
+        choice = std::move(*other);
         if (!choice.repaired && repaired) choice.repaired = *repaired;
     }
 }

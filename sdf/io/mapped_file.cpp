@@ -39,7 +39,13 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
 }
 
 MappedFile::~MappedFile() {
+    unmap();
+}
+
+void MappedFile::unmap() {
     if (size_ > 0) ::munmap(const_cast<char*>(data_), size_);
+    data_ = nullptr;
+    size_ = 0;
 }
 
 }  // namespace bilayer::detail

@@ -20,6 +20,9 @@ class MappedFile {
 
     std::string_view bytes() const { return {data_, size_}; }
 
+    /// Releases the memory: nothing may refer to the bytes any more.
+    void unmap();
+
   private:
     const char* data_ = nullptr;
     std::size_t size_ = 0;

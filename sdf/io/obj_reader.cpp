@@ -213,7 +213,7 @@ std::vector<std::string> notes(const TextSource& source, const std::vector<ObjPa
 /// Joins all parts.
 Polygons joined(const TextSource& source, std::vector<ObjPart>& parts) {
     Polygons all;
-    const std::vector<std::size_t> begins = setPoints(all, parts);
+    const std::vector<std::size_t> begins = takePoints(all, parts);
     const std::size_t vertices = all.points.size();
     inOrder(parts.size(), [&](std::size_t i) {
         ObjPart& part = parts[i];
@@ -232,11 +232,13 @@ Polygons joined(const TextSource& source, std::vector<ObjPart>& parts) {
 }  // namespace
 
 Mesh readObj(const std::filesystem::path& path, ReadReport& report) {
-    const MappedFile file(path);
+    MappedFile file(path);
     const TextSource source(path, file.bytes());
     std::vector<ObjPart> parts = cut(source);
     inOrder(parts.size(), [&](std::size_t i) { PartReader(source, parts[i]).run(); });
-    return assembled(joined(source, parts), path, report);
+    Polygons polygons = joined(source, parts);
+    file.unmap();
+    return assembled(std::move(polygons), path, report);
 }
 
 }  // namespace bilayer::detail

@@ -226,11 +226,12 @@ std::vector<OffLayout> layoutsOf(const TextSource& source, const OffHeader& head
     std::vector<int> counts{others};
     if (has("C")) counts = {others + 4, others + 3};
     const int inFirstLine = wordsOfFirstLine(source, data) - 3;
-    const bool isUsual = std::find(counts.begin(), counts.end(), inFirstLine) != counts.end();
-    if (isUsual) counts = {inFirstLine};
+    // a line may also end within a vertex, so that the other count is possible too
+    const auto usual = std::find(counts.begin(), counts.end(), inFirstLine);
+    if (usual != counts.end()) std::rotate(counts.begin(), usual, usual + 1);
     std::vector<OffLayout> layouts;
     for (const int count : counts) {
-        layouts.push_back({count, true, isUsual ? 0 : 3});
+        layouts.push_back({count, true, count == inFirstLine ? 0 : 3});
         layouts.push_back({count, false, 2});
     }
     layouts.push_back({std::nullopt, true});
@@ -251,11 +252,13 @@ Polygons readAnyLayout(const TextSource& source, const OffHeader& header) {
 }  // namespace
 
 Mesh readOff(const std::filesystem::path& path, ReadReport& report) {
-    const MappedFile file(path);
+    MappedFile file(path);
     const TextSource source(path, file.bytes());
     const OffHeader header = readHeader(source);
     requireRoom(source, header);
-    return assembled(readAnyLayout(source, header), path, report);
+    Polygons polygons = readAnyLayout(source, header);
+    file.unmap();
+    return assembled(std::move(polygons), path, report);
 }
 
 }  // namespace bilayer::detail

@@ -40,7 +40,8 @@ class BinaryValues {
 
     void endRecord() { ++record_; }
 
-    [[noreturn]] void fail(const std::string& why) const { header_.fail(why); }
+    /// Names the byte at which the last value begins.
+    [[noreturn]] void fail(const std::string& why) const { failAt(last_, why); }
 
     /// What is left to read.
     const PlyData& data() const { return data_; }
@@ -48,8 +49,8 @@ class BinaryValues {
   private:
     template <class Value>
     Value loadAs(PlyType type) {
-        const char* at = take(sizeOf(type));
-        return withPlyType(type, [&](auto stored) { return Value(loadPly<decltype(stored)>(at, data_.swapped)); });
+        last_ = take(sizeOf(type));
+        return withPlyType(type, [&](auto stored) { return Value(loadPly<decltype(stored)>(last_, data_.swapped)); });
     }
 
     const char* take(std::size_t size) {
@@ -57,14 +58,16 @@ class BinaryValues {
         return std::exchange(data_.at, data_.at + size);
     }
 
-    [[noreturn]] void failTooShort() const {
-        fail(fmt::format("byte {}: {}", data_.end - header_.begin, header_.endsAfter(record_, element_)));
+    [[noreturn]] void failTooShort() const { failAt(data_.end, header_.endsAfter(record_, element_)); }
+    [[noreturn]] void failAt(const char* at, const std::string& why) const {
+        header_.fail(fmt::format("byte {}: {}", at - header_.begin, why));
     }
 
     const PlyHeader& header_;
     const PlyElement& element_;
     PlyData data_;
     std::size_t record_;
+    const char* last_ = nullptr;
 };
 
 /// A text of values, and how its records are separated.

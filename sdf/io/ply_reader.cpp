@@ -83,7 +83,7 @@ class PlyReader {
     }
 
     PolygonsOf<Scalar> finished() {
-        if (polygons_.triangles.empty()) setFaces(polygons_, faces_);
+        if (polygons_.triangles.empty()) setFaces(polygons_, std::move(faces_));
         return std::move(polygons_);
     }
 
@@ -113,14 +113,18 @@ Polygons readText(const PlyHeader& header, const TextSource& source) {
 }  // namespace
 
 Mesh readPly(const std::filesystem::path& path, ReadReport& report) {
-    const MappedFile file(path);
+    MappedFile file(path);
+    const auto assembledOf = [&](auto polygons) {
+        file.unmap();
+        return assembled(std::move(polygons), path, report);
+    };
     const TextSource source(path, file.bytes());
     const PlyHeader header = readPlyHeader(path, source);
-    if (header.format == PlyFormat::text) return assembled(readText(header, source), path, report);
+    if (header.format == PlyFormat::text) return assembledOf(readText(header, source));
     const bool isBig = std::endian::native == std::endian::big;
     const PlyData data{header.end, source.end(), (header.format == PlyFormat::binaryBig) != isBig};
-    if (header.storesFloats()) return assembled(PlyReader<float>(header).readBinary(data), path, report);
-    return assembled(PlyReader<double>(header).readBinary(data), path, report);
+    if (header.storesFloats()) return assembledOf(PlyReader<float>(header).readBinary(data));
+    return assembledOf(PlyReader<double>(header).readBinary(data));
 }
 
 }  // namespace bilayer::detail

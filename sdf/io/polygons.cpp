@@ -205,13 +205,14 @@ std::size_t faceCount(const PolygonsOf<Scalar>& polygons) {
 
 /// Sets the faces of all parts, which have three corners each.
 /// @param begins  the first corner of each part among all; their count at the end
-void setTriangles(std::vector<glm::uvec3>& triangles, const std::vector<Faces>& parts,
+void setTriangles(std::vector<glm::uvec3>& triangles, std::vector<Faces>& parts,
                   const std::vector<std::size_t>& begins) {
     resizeLarge(triangles, begins.back() / 3);
     inOrder(parts.size(), [&](std::size_t i) {
         const std::vector<unsigned>& corners = parts[i].corners;
         glm::uvec3* to = triangles.data() + begins[i] / 3;
         for (std::size_t k = 0; k < corners.size(); k += 3) *to++ = {corners[k], corners[k + 1], corners[k + 2]};
+        parts[i] = {};
     });
 }
 
@@ -246,7 +247,7 @@ bool isTooFarForFloats(double farthest, double size) {
 }
 
 template <class Scalar>
-void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts) {
+void setFaces(PolygonsOf<Scalar>& polygons, std::vector<Faces> parts) {
     std::vector<std::size_t> corners{0}, sizes{0};
     bool isOfTriangles = true;
     std::size_t small = 0;
@@ -265,6 +266,7 @@ void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts) {
             std::copy(parts[i].corners.begin(), parts[i].corners.end(),
                       polygons.corners.begin() + std::ptrdiff_t(corners[i]));
             std::copy(parts[i].sizes.begin(), parts[i].sizes.end(), polygons.sizes.begin() + std::ptrdiff_t(sizes[i]));
+            parts[i] = {};
         });
     }
     if (small > 0)
@@ -283,8 +285,8 @@ Mesh assembled(PolygonsOf<Scalar> polygons, const std::filesystem::path& path, R
     }
 }
 
-template void setFaces(PolygonsOf<float>&, const std::vector<Faces>&);
-template void setFaces(PolygonsOf<double>&, const std::vector<Faces>&);
+template void setFaces(PolygonsOf<float>&, std::vector<Faces>);
+template void setFaces(PolygonsOf<double>&, std::vector<Faces>);
 template Mesh assembled(PolygonsOf<float>, const std::filesystem::path&, ReadReport&);
 template Mesh assembled(PolygonsOf<double>, const std::filesystem::path&, ReadReport&);
 

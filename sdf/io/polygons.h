@@ -53,7 +53,7 @@ struct Faces {
 
 /// Sets the faces of the polygons to those of all parts, in order. Adds notes about omitted faces.
 template <class Scalar>
-void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts);
+void setFaces(PolygonsOf<Scalar>& polygons, std::vector<Faces> parts);
 
 /// A part of a text file, made of whole lines, and its contents.
 struct TextPart {
@@ -62,16 +62,17 @@ struct TextPart {
     Faces faces{};
 };
 
-/// Sets the points of the polygons to those of all parts, in order.
+/// Moves the points of all parts into the polygons, in order.
 /// @tparam Part  derives from TextPart
 /// @return the index of the first point of each part, and the total count at the end
 template <class Part>
-std::vector<std::size_t> setPoints(Polygons& polygons, const std::vector<Part>& parts) {
+std::vector<std::size_t> takePoints(Polygons& polygons, std::vector<Part>& parts) {
     std::vector<std::size_t> begins{0};
     for (const Part& part : parts) begins.push_back(begins.back() + part.points.size());
     polygons.points.resize(begins.back());
     inOrder(parts.size(), [&](std::size_t i) {
         std::copy(parts[i].points.begin(), parts[i].points.end(), polygons.points.begin() + std::ptrdiff_t(begins[i]));
+        parts[i].points = {};
     });
     return begins;
 }
@@ -81,7 +82,7 @@ template <class Part>
 void takeFaces(Polygons& polygons, std::vector<Part>& parts) {
     std::vector<Faces> faces;
     for (Part& part : parts) faces.push_back(std::move(part.faces));
-    setFaces(polygons, faces);
+    setFaces(polygons, std::move(faces));
 }
 
 /// Largest relative error of a real number that is rounded to a float.

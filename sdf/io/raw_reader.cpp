@@ -92,9 +92,11 @@ class RawReader {
 }  // namespace
 
 Mesh readRaw(const std::filesystem::path& path, ReadReport& report) {
-    const MappedFile file(path);
+    MappedFile file(path);
     const TextSource source(path, file.bytes());
-    return assembled(RawReader(source).run(), path, report);
+    Polygons polygons = RawReader(source).run();
+    file.unmap();
+    return assembled(std::move(polygons), path, report);
 }
 
 }  // namespace bilayer::detail

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "sdf/base/large_array.h"
@@ -53,7 +54,7 @@ void requireFinite(const glm::vec3* corners, std::size_t triangle, const std::fi
                                 path.string(), triangle, corners[k][axis]));
 }
 
-Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadReport& report) {
+PolygonsOf<float> readBinary(std::string_view bytes, const std::filesystem::path& path) {
     static_assert(std::endian::native == std::endian::little, "STL files are little-endian");
     const std::uint32_t count = loadCount(bytes);
     if (bytes.size() < binarySize(0))
@@ -81,7 +82,7 @@ Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadR
             if (!std::isfinite(sum.x + sum.y + sum.z)) requireFinite(corners, i, path);
         }
     });
-    return assembled(std::move(polygons), path, report);
+    return polygons;
 }
 
 /// A part of a text file. Its points are the corners of its faces, in order.
@@ -165,7 +166,7 @@ const char* nextFacet(const char* at, const char* end) {
     return end;
 }
 
-Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadReport& report) {
+Polygons readText(const TextSource& source) {
     std::vector<StlPart> parts;
     for (const char* begin = source.begin(); begin != source.end();) {
         const std::size_t size = std::min(textPartBytes, std::size_t(source.end() - begin));
@@ -176,7 +177,7 @@ Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadR
     inOrder(parts.size(), [&](std::size_t i) { TextReader(source, parts[i]).run(); });
     if (!parts.back().endsSolid) source.fail(source.end(), "the file ends before its 'endsolid'");
     Polygons polygons;
-    const std::vector<std::size_t> begins = setPoints(polygons, parts);
+    const std::vector<std::size_t> begins = takePoints(polygons, parts);
     inOrder(parts.size(), [&](std::size_t i) {
         for (unsigned& corner : parts[i].faces.corners) corner += unsigned(begins[i]);
     });
@@ -186,16 +187,20 @@ Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadR
                                                  counted(part.linesLeft, "line", "lines"),
                                                  source.quoted(part.firstLeft), source.lineOf(part.firstLeft)));
     takeFaces(polygons, parts);
-    return assembled(std::move(polygons), path, report);
+    return polygons;
 }
 
 }  // namespace
 
 Mesh readStl(const std::filesystem::path& path, ReadReport& report) {
-    const MappedFile file(path);
+    MappedFile file(path);
+    const auto assembledOf = [&](auto polygons) {
+        file.unmap();
+        return assembled(std::move(polygons), path, report);
+    };
     const TextSource source(path, file.bytes());
-    if (isText(file.bytes(), source.text())) return readText(source, path, report);
-    return readBinary(file.bytes(), path, report);
+    return isText(file.bytes(), source.text()) ? assembledOf(readText(source))
+                                               : assembledOf(readBinary(file.bytes(), path));
 }
 
 }  // namespace bilayer::detail

@@ -33,8 +33,8 @@ struct Orientation {
 ///   is correct under winding numbers. If the component was inconsistent, or one around it was inconsistent or flipped,
 ///   the file is not reliable, and the component becomes a cavity.
 /// - Components that enclose almost no volume keep the orientation of most of their area.
-/// - A duplicate triangle follows the triangle that it repeats. If every face of a closed surface exists twice, back to
-///   back, both copies are made to face outward.
+/// - A duplicate triangle follows the triangle that it repeats. If every face of a surface exists twice, back to back,
+///   both copies are made to face outward, provided that the surface is closed but for holes of 5 % of its area.
 /// - A mesh that is already well oriented is returned bit-identical.
 ///
 /// @param progress  polled, unless null

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/mesh/oriented_components.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
+#include <vector>
 
 namespace bilayer::detail {
 namespace {
@@ -13,9 +15,19 @@ namespace {
 /// they count as open surfaces.
 constexpr double minRoundnessClosed = 1e-9;
 constexpr double minRoundnessOpen = 1e-2;
+/// Max area of the holes of a doubled surface that still is the surface of a solid, relative to its area. The open side
+/// of a box or a bowl takes more.
+constexpr double maxHolePart = 0.05;
 
 double roundness(const OrientedComponent& c) {
     return 6 * std::sqrt(glm::pi<double>()) * std::abs(c.volume) / std::pow(c.area, 1.5);
+}
+
+// Of all holes with the same border, a circle has the largest area. Each face of the component exists twice, and so
+// does each use of an edge.
+bool isClosedButForSmallHoles(const OrientedComponent& c) {
+    const double border = 0.5 * c.borderLength, area = 0.5 * c.area;
+    return c.closed() || border * border / (4 * glm::pi<double>()) <= maxHolePart * area;
 }
 
 }  // namespace
@@ -55,14 +67,16 @@ void OrientedComponents::gather() {
         componentOf(i).triangles.push_back(i);
     }
     for (const unsigned triangle : consistent_.contradictions()) componentOf(triangle).oneSided = true;
+    for (const unsigned i : consistent_.eachTriangle()) componentOf(i).area += glm::length(areaVector(i));
+    findBorders();
     findTwoSided();
 }
 
-// A doubled body is a solid only if all of its components are closed.
+// A doubled body is a solid only if all of its components are closed but for small holes.
 void OrientedComponents::findTwoSided() {
     std::vector<bool> open(mesh_.triangles.size());
     for (const unsigned i : consistent_.eachTriangle())
-        if (componentOf(i).oneSided || !componentOf(i).closed()) open[consistent_.body(i)] = true;
+        if (componentOf(i).oneSided || !isClosedButForSmallHoles(componentOf(i))) open[consistent_.body(i)] = true;
     for (const unsigned i : consistent_.eachTriangle())
         componentOf(i).twoSided = consistent_.doubled(i) && open[consistent_.body(i)];
 }
@@ -70,9 +84,7 @@ void OrientedComponents::findTwoSided() {
 void OrientedComponents::keepMajority() {
     for (const unsigned i : consistent_.eachTriangle()) {
         OrientedComponent& component = componentOf(i);
-        const double area = glm::length(areaVector(i));
-        component.area += area;
-        if (flipped_[i]) component.flippedArea += area;
+        if (flipped_[i]) component.flippedArea += glm::length(areaVector(i));
         component.mixed |= flipped_[i] && consistent_.topology().proper(i);
         for (int k = 0; k < 3; ++k) component.bounds.add(mesh_.points[mesh_.triangles[i][k]]);
     }
@@ -91,7 +103,6 @@ void OrientedComponents::flip(OrientedComponent& component) {
 }
 
 void OrientedComponents::measure() {
-    findBorders();
     for (const unsigned i : consistent_.eachTriangle()) {
         if (!consistent_.counts(i)) continue;
         OrientedComponent& component = componentOf(i);
@@ -100,18 +111,28 @@ void OrientedComponents::measure() {
     }
 }
 
-// Finds the unbalanced edges of each component, and sums them weighted by length.
+// Finds the unbalanced edges of each component, and sums them weighted by length and by their uses.
 void OrientedComponents::findBorders() {
+    struct Use {
+        unsigned component;
+        int net;  // the direction as oriented; 0 if the triangle does not count
+    };
+    std::vector<Use> sorted;
     consistent_.topology().forEachEdge([&](std::span<const EdgeUse> uses) {
-        const glm::dvec3 a = mesh_.points[uses[0].low], b = mesh_.points[uses[0].high];
+        sorted.clear();
         for (const EdgeUse& use : uses) {
+            const int direction = flipped_[use.triangle] ? -use.direction() : use.direction();
+            sorted.push_back({componentOf_[use.triangle], consistent_.counts(use.triangle) ? direction : 0});
+        }
+        std::sort(sorted.begin(), sorted.end(), [](const Use& a, const Use& b) { return a.component < b.component; });
+        const glm::dvec3 a = mesh_.points[uses[0].low], b = mesh_.points[uses[0].high];
+        for (std::size_t begin = 0, end = 0; begin < sorted.size(); begin = end) {
             int net = 0;
-            for (const EdgeUse& other : uses)
-                if (consistent_.counts(other.triangle) && componentOf_[other.triangle] == componentOf_[use.triangle])
-                    net += flipped_[other.triangle] ? -other.direction() : other.direction();
+            for (; end < sorted.size() && sorted[end].component == sorted[begin].component; ++end)
+                net += sorted[end].net;
             if (net == 0) continue;
-            OrientedComponent& component = componentOf(use.triangle);
-            const double length = glm::length(b - a);
+            OrientedComponent& component = components_[sorted[begin].component];
+            const double length = double(end - begin) * glm::length(b - a);
             component.borderCentre += 0.5 * length * (a + b);
             component.borderLength += length;
         }

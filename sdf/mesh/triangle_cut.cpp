@@ -83,16 +83,13 @@ glm::dvec3 centroid(const Polygon& polygon) {
 
 class Cutter {
   public:
-    Cutter(const glm::dvec3& normal, double slack, const std::function<bool(const glm::dvec3&)>& keeps)
-        : normal_(normal), slack_(slack), keeps_(keeps) {}
+    /// Pieces that cover a polygon. A polygon without area has none.
+    using Pieces = std::vector<LabelledPiece>;
 
-    /// The kept part of a polygon. Parts thinner than the slack are neither kept nor dropped.
-    struct Part {
-        bool anyKept = false, anyDropped = false;
-        std::vector<Polygon> pieces;
-    };
+    Cutter(const glm::dvec3& normal, double slack, const std::function<int(const glm::dvec3&)>& labelOf)
+        : normal_(normal), slack_(slack), labelOf_(labelOf) {}
 
-    Part divide(Polygon polygon, std::vector<Segment> segments) const {
+    Pieces divide(Polygon polygon, std::vector<Segment> segments) const {
         while (!segments.empty()) {
             Split halves = splitAcross(polygon, segments);
             if (!isUseful(halves, segments.size())) {
@@ -106,7 +103,7 @@ class Cutter {
             return joined(std::move(polygon), divide(std::move(halves.polygons[0]), std::move(halves.segments[0])),
                           divide(std::move(halves.polygons[1]), std::move(halves.segments[1])));
         }
-        return judged(std::move(polygon));
+        return labelled(std::move(polygon));
     }
 
   private:
@@ -149,29 +146,23 @@ class Cutter {
         return {*half, length > 0 ? inPlane / length : unit};
     }
 
-    Part judged(Polygon polygon) const {
+    Pieces labelled(Polygon polygon) const {
         if (polygon.size() < 3) return {};
-        const bool kept = keeps_(centroid(polygon));
-        Part part{kept, !kept, {}};
-        if (kept) part.pieces.push_back(std::move(polygon));
-        return part;
+        const int label = labelOf_(centroid(polygon));
+        return {{std::move(polygon), label}};
     }
 
-    static Part joined(Polygon whole, Part a, Part b) {
-        Part part{a.anyKept || b.anyKept, a.anyDropped || b.anyDropped, {}};
-        if (!part.anyKept) return part;
-        if (!part.anyDropped)
-            part.pieces.push_back(std::move(whole));
-        else {
-            part.pieces = std::move(a.pieces);
-            std::move(b.pieces.begin(), b.pieces.end(), std::back_inserter(part.pieces));
-        }
-        return part;
+    static Pieces joined(Polygon whole, Pieces a, Pieces b) {
+        std::move(b.begin(), b.end(), std::back_inserter(a));
+        const bool uniform =
+            std::all_of(a.begin(), a.end(), [&](const auto& piece) { return piece.label == a[0].label; });
+        if (a.empty() || !uniform) return a;
+        return {{std::move(whole), a[0].label}};
     }
 
     const glm::dvec3 normal_;
     const double slack_;
-    const std::function<bool(const glm::dvec3&)>& keeps_;
+    const std::function<int(const glm::dvec3&)>& labelOf_;
 };
 
 }  // namespace
@@ -189,9 +180,9 @@ bool clip(Segment& segment, const Polygon& polygon, const glm::dvec3& normal, do
     return true;
 }
 
-std::vector<Polygon> cut(const Polygon& polygon, const glm::dvec3& normal, std::vector<Segment> segments, double slack,
-                         const std::function<bool(const glm::dvec3& inside)>& keeps) {
-    return Cutter(normal, slack, keeps).divide(polygon, std::move(segments)).pieces;
+std::vector<LabelledPiece> cut(const Polygon& polygon, const glm::dvec3& normal, std::vector<Segment> segments,
+                               double slack, const std::function<int(const glm::dvec3& inside)>& labelOf) {
+    return Cutter(normal, slack, labelOf).divide(polygon, std::move(segments));
 }
 
 }  // namespace bilayer::detail

@@ -20,13 +20,19 @@ struct Segment {
 /// @param normal  the polygon's unit normal
 bool clip(Segment& segment, const Polygon& polygon, const glm::dvec3& normal, double slack);
 
-/// Cuts a convex polygon into pieces that no segment crosses, and returns the pieces for which `keeps` holds. It splits
-/// the plane along one line after another. If all pieces of a split are kept, they remain one piece. Pieces thinner
+/// A part of a polygon, with the label of its interior.
+struct LabelledPiece {
+    Polygon polygon;
+    int label;
+};
+
+/// Cuts a convex polygon into pieces that no segment crosses. It splits the plane along one line after another. If all
+/// pieces of a split have the same label, they remain one piece: a polygon of one label stays whole. Pieces thinner
 /// than `slack` are merged into their neighbours.
 /// @param normal    the polygon's unit normal
 /// @param segments  in the polygon's plane and inside of it, as clip() returns them
-/// @param keeps     called with an interior point of each piece
-std::vector<Polygon> cut(const Polygon& polygon, const glm::dvec3& normal, std::vector<Segment> segments, double slack,
-                         const std::function<bool(const glm::dvec3& inside)>& keeps);
+/// @param labelOf   called with an interior point of each piece
+std::vector<LabelledPiece> cut(const Polygon& polygon, const glm::dvec3& normal, std::vector<Segment> segments,
+                               double slack, const std::function<int(const glm::dvec3& inside)>& labelOf);
 
 }  // namespace bilayer::detail

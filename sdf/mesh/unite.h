@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/mesh/surface_pieces.h"
 
 namespace bilayer::detail {
 
@@ -30,5 +31,15 @@ struct UnionSurface {
 /// @param progress  polled, unless null
 /// Throws as validate() does.
 UnionSurface unite(const Mesh& mesh, Progress* progress = nullptr);
+
+/// Returns the boundary of the union of all solids of a closed mesh, that is, of the points whose winding number is
+/// above 1/2. Unlike the surface that unite() returns, it omits surfaces with no solid on either side. Copies of a
+/// boundary coincide if solids lie flush. The label of a triangle is the count of its copies, those of the opposite
+/// orientation subtracted. An integral over the surface of the union is thus the sum over all triangles of their
+/// integrals, divided by the labels.
+/// @param closed    balanced(), for example after orient()
+/// @param progress  polled, unless null
+/// Throws as validate() does.
+LabelledMesh unionBoundary(const Mesh& closed, Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

@@ -140,15 +140,22 @@ SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress) {
     return chooseFor(orient(mesh, progress), fmt::format("closed and oriented, but {}", trouble), progress);
 }
 
-Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh) {
+Mesh orientedMesh(const LevelSet& levelSet, Mesh mesh) {
     validate(mesh);
     if (levelSet.meshHash() != 0 && levelSet.meshHash() != hash(mesh))
         throw std::invalid_argument("the level set is of another mesh");
     const std::string& reason = levelSet.signReason();
     const bool asItStands = reason == closedAndOriented || reason == asAskedFor;
     if (levelSet.sign() == "normals" && asItStands) return mesh;
-    Mesh outward = orient(mesh).mesh;
-    return reason.starts_with(unionOfSolids) ? unite(outward).mesh : outward;
+    return orient(mesh).mesh;
+}
+
+Mesh outerSurface(const LevelSet& levelSet, Mesh oriented) {
+    return levelSet.signReason().starts_with(unionOfSolids) ? unite(oriented).mesh : oriented;
+}
+
+Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh) {
+    return outerSurface(levelSet, orientedMesh(levelSet, std::move(mesh)));
 }
 
 }  // namespace bilayer::detail

@@ -60,9 +60,16 @@ SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress = nullptr);
 /// together with a repaired mesh. Throws as validate() does.
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress = nullptr);
 
-/// Returns the mesh of a level set as build() interpreted it: oriented outward, without the walls that
-/// BuildOptions::unite removed inside a union. A mesh that needed no repair, or whose normals were used unchanged,
-/// keeps its bytes. Throws std::invalid_argument as validate() does, and if the level set belongs to another mesh.
+/// Returns the mesh of a level set as build() interpreted it: oriented outward. A mesh that needed no repair, or whose
+/// normals were used unchanged, keeps its bytes. Throws std::invalid_argument as validate() does, and if the level set
+/// belongs to another mesh.
+Mesh orientedMesh(const LevelSet& levelSet, Mesh mesh);
+
+/// Returns the surface to which a level set's distances refer, from orientedMesh(): without the walls that
+/// BuildOptions::unite removed inside a union.
+Mesh outerSurface(const LevelSet& levelSet, Mesh oriented);
+
+/// Returns the outer surface of the oriented mesh. Throws as orientedMesh() does.
 Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh);
 
 }  // namespace bilayer::detail

@@ -358,6 +358,28 @@ TEST_CASE("the field of a union has the volume of the union") {
     }
 }
 
+TEST_CASE("a body of overlapping solids has the mass of their union, at any voxel size") {
+    const unsigned randomSeed = seed();
+    CAPTURE(randomSeed);
+    Random random(randomSeed);
+    // bars whose ends stand out of each other
+    const std::vector<Bounds> bars{{glm::vec3(-1, -0.1f, -0.1f), glm::vec3(1, 0.1f, 0.1f)},
+                                   {glm::vec3(-0.1f, -1, -0.1f), glm::vec3(0.1f, 1, 0.1f)},
+                                   {glm::vec3(-0.1f, -0.1f, -0.6f), glm::vec3(0.12f, 0.15f, 1)}};
+    std::vector<Mesh> parts;
+    for (const Bounds& bar : bars) parts.push_back(shapes::moved(shapes::box(0.5f * bar.size()), bar.centre()));
+    const bool unites = GENERATE(true, false);
+    CAPTURE(unites);
+    for (const int resolution : {32, 64, 128}) {
+        CAPTURE(resolution);
+        const glm::mat4 motion = randomMotion(random);
+        const Mesh mesh = transformed(shapes::join(parts), motion);
+        const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, resolution), .unite = unites});
+        const Mesh truth = transformed(surfaceOfUnion(bars), motion);
+        requireMass(Collider(mesh, field).mass(), massProperties(truth), 2e-6, 5);
+    }
+}
+
 TEST_CASE("a body whose every face is there twice, back to back, weighs what one half of them holds") {
     const Mesh box = shapes::box({0.5f, 0.4f, 0.3f}, 2);
     const Mesh mesh = shapes::join({box, shapes::flipped(box)});

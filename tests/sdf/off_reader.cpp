@@ -31,7 +31,7 @@ TEST_CASE("OFF: words, not lines, with colours or without") {
           std::pair("NOFF", " 0 0 1"), std::pair("CNOFF", " 0 0 1 255 0 0 255"), std::pair("STOFF", " 0.5 0.5")})
         for (const char* face : {"", " 255 0 0", " 0.1 0.2 0.3 0.4"})
             for (const char* counts : {"8 6 12\n", "8 6\n", "8\n6\n12\n", "8\n6\n"})
-                for (const unsigned period : {2u, 4u, 8u, 1000u}) {
+                for (const unsigned period : {2u, 4u, 6u, 7u, 8u, 1000u}) {
                     CAPTURE(keyword, vertex, face, counts, period);
                     std::string text = offOfBox(keyword, vertex, face, counts);
                     const std::size_t begin = text.find(counts) + std::strlen(counts), end = text.find("4 0 3");

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <limits>
 #include <random>
+#include <utility>
 
 #include <bilayer/sdf/mesh_io.h>
 #include "box_files.h"
@@ -68,6 +70,29 @@ TEST_CASE("PLY: reals in lists are whole numbers") {
                                   Contains("real.ply: ") && Contains("face 0: its list 'vertex_indices' has ") &&
                                       Contains("where a whole number should stand"));
         }
+}
+
+TEST_CASE("PLY: an error in binary data names the byte of the value") {
+    for (const char* format : {"binary_little_endian", "binary_big_endian"})
+        for (const bool more : {false, true})
+            for (const auto& [face, corner] : {std::pair(0, 0), std::pair(0, 3), std::pair(5, 2)}) {
+                CAPTURE(format, more, face, corner);
+                std::string bytes = plyOfBox({.format = format, .more = more});
+                // before the corners of a face: the other element, the vertices, the faces, the area, and the count
+                const int before = more ? 4 + 8 * 20 + face * 30 + 9 : 8 * 12 + face * 17 + 1;
+                const std::size_t at = bytes.find("end_header\n") + 11 + std::size_t(before + corner * 4);
+                const bool isLittle = format[7] == 'l';
+                bytes.replace(at, 4, isLittle ? std::string("c\0\0\0", 4) : std::string("\0\0\0c", 4));
+                CHECK_THROWS_WITH(readMesh(write("index.ply", bytes)),
+                                  Contains(fmt::format(
+                                      "index.ply: byte {}: face {} refers to vertex 99, but there are 8", at, face)));
+            }
+    std::string bytes = plyOfBox({.format = "binary_little_endian"});
+    const float bad = std::numeric_limits<float>::infinity();
+    const std::size_t at = bytes.find("end_header\n") + 11 + 3 * 12 + 4;
+    std::memcpy(&bytes[at], &bad, sizeof bad);
+    CHECK_THROWS_WITH(readMesh(write("infinite.ply", bytes)),
+                      Contains(fmt::format("infinite.ply: byte {}: vertex 3: its y is inf", at)));
 }
 
 TEST_CASE("PLY: words of a text may stand on any lines") {

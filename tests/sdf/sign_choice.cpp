@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/sign/sign_choice.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <random>
+#include <string>
+#include <vector>
 
 #include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/inspect.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/mesh/side_classification.h"
 #include "tests/support/support.h"
 
@@ -225,5 +230,50 @@ TEST_CASE("after a conflict, surfaces that meet themselves get winding numbers, 
         CAPTURE(c.name, choice.reason);
         CHECK(choice.sign == c.sign);
         CHECK(choice.repaired.has_value() == c.repaired);
+    }
+}
+
+TEST_CASE("a double-sided surface is a solid if it is closed but for small holes") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    const auto voxelsInside = [](const LevelSet& field) {
+        std::size_t count = 0;
+        for (auto value = field.grids().distance->cbeginValueOn(); value; ++value) count += *value < 0;
+        return count;
+    };
+    const std::vector<Mesh> solids{shapes::sphere(1, 3), shapes::torus(1, 0.4f), shapes::box({1, 0.7f, 0.5f}, 6)};
+    for (int round = 0; round < 12; ++round) {
+        const bool isSolid = round % 2 == 0;
+        Mesh half = solids[std::size_t(round / 2) % 3];
+        CAPTURE(round, isSolid);
+        if (isSolid)
+            for (int hole = 1 + round % 3; hole > 0; --hole)
+                half.triangles.erase(half.triangles.begin() + std::ptrdiff_t(random() % half.triangles.size()));
+        else {  // without a third of its height
+            const float top = 0.33f * bounds(half).upper.z;
+            std::erase_if(half.triangles, [&](const glm::uvec3& t) {
+                return std::max({half.points[t.x].z, half.points[t.y].z, half.points[t.z].z}) > top;
+            });
+        }
+        const bool isInsideOut = random() % 2;
+        const Mesh outward = half;
+        if (isInsideOut) half = shapes::flipped(half);
+        const Mesh mesh = weld(shapes::join({half, shapes::flipped(half)}));
+        const float h = voxelSizeFor(mesh, 20 + float(random() % 40));
+        for (const Method method : {Method::exact, Method::pseudonormal}) {
+            const LevelSet field = build(mesh, {.voxelSize = h, .method = method});
+            CAPTURE(isInsideOut, h, method, field.sign(), field.signReason());
+            if (!isSolid) {
+                CHECK(field.sign() == "normals");
+                CHECK(double(voxelsInside(field)) < 1e-3 * double(field.activeVoxels()));
+                continue;
+            }
+            CHECK(field.sign() == "winding");
+            CHECK(field.signReason().find("back to back") != std::string::npos);
+            // the same surface with one side has the same inside, but near the holes
+            const LevelSet once = build(outward, {.voxelSize = h, .method = method});
+            CHECK(double(voxelsInside(field)) == Approx(double(voxelsInside(once))).epsilon(2e-2));
+        }
     }
 }

@@ -10,6 +10,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
@@ -206,6 +207,45 @@ double toFree(const glm::dvec3& p, const RotatedBox& box, const RotatedBox& othe
     return smallest;
 }
 
+double coneVolume(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+    return glm::dot(a, glm::cross(b, c)) / 6;
+}
+
+// The volume of the union of two boxes, from the faces of each within the other.
+double unionVolume(const RotatedBox& a, const RotatedBox& b) {
+    double volume = 8 * (a.half.x * a.half.y * a.half.z + b.half.x * b.half.y * b.half.z);
+    for (const auto& [box, other] : {std::pair(a, b), std::pair(b, a)})
+        for (const auto& face : box.faces()) {
+            const auto common = other.clipped(face);
+            // `faces` runs around some faces in the other direction
+            const double side = glm::dot(glm::cross(face[1] - face[0], face[2] - face[0]), face[0] - box.centre);
+            for (std::size_t i = 2; i < common.size(); ++i)
+                volume -= (side > 0 ? 1 : -1) * coneVolume(common[0], common[i - 1], common[i]);
+        }
+    return volume;
+}
+
+double volumeWithin(const LabelledMesh& boundary) {
+    double volume = 0;
+    for (std::size_t i = 0; i < boundary.mesh.triangles.size(); ++i) {
+        const glm::uvec3& t = boundary.mesh.triangles[i];
+        const auto& points = boundary.mesh.points;
+        volume += coneVolume(points[t.x], points[t.y], points[t.z]) / boundary.labels[i];
+    }
+    return volume;
+}
+
+Mesh randomSolid(std::mt19937& random) {
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<float> size(0.2f, 0.6f), place(-0.4f, 0.4f);
+    std::vector<Mesh> kinds{shapes::sphere(size(random), 3), shapes::torus(size(random) + 0.2f, 0.18f, 48, 24),
+                            shapes::box({size(random), size(random), 0.15f}), shapes::cylinder(size(random), 0.9f, 40)};
+    const glm::dquat rotation =
+        glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)));
+    Mesh solid = turned(kinds[random() % kinds.size()], rotation);
+    return shapes::moved(solid, {place(random), place(random), place(random)});
+}
+
 // The signed distance of two balls whose surfaces intersect.
 double toBalls(const glm::dvec3& p, const glm::dvec3& c1, double r1, const glm::dvec3& c2, double r2) {
     const double d1 = glm::length(p - c1) - r1, d2 = glm::length(p - c2) - r2;
@@ -279,6 +319,83 @@ TEST_CASE("the union of two boxes at any angle has their outer surface") {
             REQUIRE(united.distance(p) ==
                     Approx(std::min(toFree(p, boxes[0], boxes[1]), toFree(p, boxes[1], boxes[0]))).margin(2e-6));
     }
+}
+
+TEST_CASE("the boundary of a union encloses its volume: boxes at any angle") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> size(0.05, 0.7), place(-0.3, 0.3);
+    for (int i = 0; i < 300; ++i) {
+        CAPTURE(i);
+        std::array<RotatedBox, 2> boxes;
+        for (RotatedBox& box : boxes)
+            box = {{place(random), place(random), place(random)},
+                   {size(random), size(random), size(random)},
+                   glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)))};
+        const double volume = unionVolume(boxes[0], boxes[1]);
+        CHECK(volumeWithin(unionBoundary(shapes::join({boxes[0].mesh(), boxes[1].mesh()}))) ==
+              Approx(volume).margin(1e-6));
+    }
+}
+
+TEST_CASE("the boundary of a union encloses its volume: boxes that touch and lie flush, copies, cavities") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    int inexact = 0;
+    std::normal_distribution<double> normal;
+    for (int i = 0; i < 200; ++i) {
+        auto boxes = randomBoxes(random, 2 + i % 5);
+        if (i % 4 == 0) boxes.push_back(boxes.front());
+        CAPTURE(i, boxes.size());
+        Mesh mesh = joined(boxes);
+        double volume = inspect(truthOf(boxes)).volume;
+        if (i % 3 == 0) {
+            // a cavity that one more solid fills in part
+            const Box around{{-2, -2, -2}, {2, 2, 2}}, cavity{{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}};
+            mesh = shapes::join({mesh, around.mesh(), shapes::flipped(cavity.mesh())});
+            volume += 64 - 27;
+        }
+        if (i % 2) {
+            const glm::dquat rotation(normal(random), normal(random), normal(random), normal(random));
+            mesh = turned(std::move(mesh), glm::normalize(rotation));
+        }
+        const double found = volumeWithin(unionBoundary(mesh));
+        CHECK(found == Approx(volume).epsilon(1e-3));
+        inexact += std::abs(found - volume) > 2e-5;
+    }
+    // rounding may put two flush faces next to as close as counts as coincident
+    CHECK(inexact <= 1);
+}
+
+TEST_CASE("the boundary of a union encloses the points with a winding number above one half") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    for (int i = 0; i < 4; ++i) {
+        CAPTURE(i);
+        std::vector<Mesh> solids;
+        for (int k = 0; k < 5; ++k) solids.push_back(randomSolid(random));
+        const Mesh mesh = shapes::join(solids);
+        const LabelledMesh boundary = unionBoundary(mesh);
+        const test::Truth truth(mesh);
+        constexpr int count = 200000;
+        constexpr double side = 3;
+        int inside = 0;
+        for (const glm::dvec3& p : randomPoints(random, count, side / 2)) inside += truth.winding(p) > 0;
+        const double share = double(inside) / count, deviation = std::sqrt(share * (1 - share) / count);
+        const double cube = side * side * side;
+        CHECK(volumeWithin(boundary) == Approx(share * cube).margin(5 * deviation * cube));
+    }
+}
+
+TEST_CASE("a union far from the world origin keeps its origin") {
+    Mesh mesh = joined({{{-1, -1, -1}, {0.5f, 1, 1}}, {{0, -1, -1}, {1, 1, 1}}});
+    mesh.origin = {5e6, 0, -3e6};
+    CHECK(unite(mesh).mesh.origin == mesh.origin);
+    CHECK(unionBoundary(mesh).mesh.origin == mesh.origin);
 }
 
 TEST_CASE("the union of balls is that of their formula but for what their facets cut off") {
