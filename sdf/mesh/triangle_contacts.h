@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the triangles of a mesh cross or touch each other.
-// Tested by tests/sdf/unite.cpp.
+// Tested by tests/sdf/unite.cpp through unite().
 #pragma once
 
 #include <array>

@@ -172,6 +172,7 @@ TEST_CASE("orient() twice is orient() once, on all of the public corpus that is 
         const Orientation once = orient(mesh);
         CHECK(once.mesh.triangles.size() == mesh.triangles.size());
         CHECK(orient(once.mesh).flippedTriangles == 0);
-        if (balanced(mesh)) CHECK(balanced(once.mesh));
+        // one half of a double-sided solid with holes is flipped, which unbalances the rims of its holes
+        if (balanced(mesh) && !hasFacesBackToBack(mesh)) CHECK(balanced(once.mesh));
     }
 }
