@@ -19,6 +19,8 @@ namespace {
 
 // A normal within this of the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
+// The normal of an end is its axis up to rounding. Next to the rim, normals are oblique (cosine).
+constexpr float exactlyFlat = 1 - 1e-6f;
 // Limit of steps in the search for the entry of a path; longer searches only graze.
 constexpr int maxSteps = 64;
 // From this fraction of the half height on, a point on the side is on a rim.
@@ -190,7 +192,7 @@ glm::vec3 Convex::supportNear(const NearestPoint& nearest, const glm::vec3& towa
 
 bool Convex::isFlat(const NearestPoint& nearest) const {
     return core_ == Core::box || (core_ == Core::hull && !isRounded(nearest)) ||
-           (core_ == Core::revolution && std::abs(nearest.normal[axis_]) > 1 - flatEnd * flatEnd);
+           (core_ == Core::revolution && std::abs(nearest.normal[axis_]) > exactlyFlat);
 }
 
 // On an edge or a vertex of a hull that is grown by a radius: its normal is no face's.

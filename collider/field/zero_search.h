@@ -25,6 +25,27 @@ namespace bilayer::detail {
 inline constexpr double smallestSide = 1.0 / 2048;
 static_assert(double(cellDiagonal) * smallestSide < zeroTolerance);
 
+/// The error that a search for the nearest zero allows. Where very many sub-cells are equally near, as from the centre
+/// of a sphere, it grows with the square of their count, up to the diagonal of a sub-cell. No sub-cell is divided from
+/// there on. So the time of a search is bounded by the count of cells that contain surface.
+class SearchTolerance {
+  public:
+    double value() const { return zeroTolerance + excess_; }
+    /// What has been added to zeroTolerance.
+    double excess() const { return excess_; }
+    /// Counts a sub-cell.
+    void count() {
+        const double share = double(++subCells_) / plentySubCells;
+        if (share > 1) excess_ = std::min(zeroTolerance * (share * share - 1), 0.5 * double(cellDiagonal));
+    }
+
+  private:
+    /// A search with one nearest place visits some hundreds.
+    static constexpr double plentySubCells = 8192;
+    std::size_t subCells_ = 0;
+    double excess_ = 0;
+};
+
 /// A cube of 2^level voxels in the directory.
 struct DirectoryCube {
     glm::ivec3 lower;
@@ -73,7 +94,7 @@ struct LinearBound {
 /// Finds the point of the zero set with the smallest key. A Query has
 ///   bound(lower, upper)  a lower bound of the keys in a box; infinite if no point counts
 ///   bound(lower, upper, linear)  the same for the points where the linear function is zero within its error
-///   limit()              only smaller keys matter
+///   limit(tolerance)     only smaller keys matter, by the error that the search allows
 ///   offer(point)         a point of the zero set
 ///   settle(bound, point) the smallest cube around a point, with a lower bound of its keys
 template <class Query>
@@ -104,8 +125,10 @@ class ZeroSearch {
             order[place] = std::uint8_t(i);
         }
         for (std::size_t i = 0; i < count; ++i)
-            if (children[order[i]].bound < query_.limit()) visit(children[order[i]].node);
+            if (children[order[i]].bound < limit()) visit(children[order[i]].node);
     }
+
+    double limit() const { return query_.limit(tolerance_); }
 
     void visit(const DirectoryCube& cube) {
         constexpr int blockLevel = 3, partLevel = 2;
@@ -120,7 +143,7 @@ class ZeroSearch {
             const glm::dvec3 low(lower), high(glm::min(lower + side, extent_));
             if (level >= partLevel && isClear(low, high)) continue;
             const double bound = query_.bound(low, high);
-            if (bound < query_.limit()) children[count++] = {bound, {lower, level}};
+            if (bound < limit()) children[count++] = {bound, {lower, level}};
         }
         visitAll(children, count);
     }
@@ -136,10 +159,10 @@ class ZeroSearch {
 
     void visit(const ZeroCube& cube) {
         const double bound = query_.bound(cube.lower, cube.lower + cube.side, LinearBound(cube));
-        if (!(bound < query_.limit())) return;
+        if (!(bound < limit())) return;
         const glm::dvec3 point = offerEdges(cube);
         if (cube.side <= smallestSide) return query_.settle(bound, point);
-        if (!(bound < query_.limit())) return;
+        if (!(bound < limit())) return;
         visitOctants(cube);
     }
 
@@ -182,8 +205,9 @@ class ZeroSearch {
             for (std::size_t c = 0; c < 8; ++c)
                 octant.values[c] = grid[first + 9 * (c >> 2) + 3 * (c >> 1 & 1) + (c & 1)];
             if (!octant.holdsZero()) continue;
+            tolerance_.count();
             children[count].bound = query_.bound(octant.lower, octant.lower + octant.side);
-            if (children[count].bound < query_.limit()) ++count;
+            if (children[count].bound < limit()) ++count;
         }
         visitAll(children, count);
     }
@@ -191,6 +215,7 @@ class ZeroSearch {
     const FieldData& field_;
     Query& query_;
     glm::ivec3 extent_;
+    SearchTolerance tolerance_;
 };
 
 }  // namespace bilayer::detail

@@ -78,9 +78,9 @@ struct NearestQuery {
     bool acceptsAny = false;  // the search ends with the first point
     std::optional<glm::dvec3> found{};
 
-    double limit() const {
-        if (!found) return std::nextafter(best, infinity);
-        return acceptsAny ? 0 : best - zeroTolerance;
+    double limit(const SearchTolerance& tolerance) const {
+        if (acceptsAny) return found ? 0 : std::nextafter(best, infinity);
+        return found ? best - tolerance.value() : std::nextafter(best, infinity) - tolerance.excess();
     }
     double bound(const glm::dvec3& lower, const glm::dvec3& upper) const { return boxDistance(point, lower, upper); }
     double bound(const glm::dvec3& lower, const glm::dvec3& upper, const LinearBound& linear) const {
@@ -100,7 +100,8 @@ struct SphereCastQuery {
     double radius, best;
     std::optional<glm::dvec3> found{};
 
-    double limit() const { return found ? best - zeroTolerance : std::nextafter(best, infinity); }
+    // Distances along the path are no lengths to trade for time: next to a grazing surface they change by many voxels.
+    double limit(const SearchTolerance&) const { return found ? best - zeroTolerance : std::nextafter(best, infinity); }
 
     double bound(const glm::dvec3& lower, const glm::dvec3& upper) const {
         return byTangents([&](const glm::dvec3& centre) -> Separation {
@@ -150,7 +151,7 @@ struct BoxQuery {
     const RotatedBox& box;
     bool found = false;
 
-    double limit() const { return found ? 0 : infinity; }
+    double limit(const SearchTolerance&) const { return found ? 0 : infinity; }
     double bound(const glm::dvec3& lower, const glm::dvec3& upper) const {
         const glm::dvec3 half = 0.5 * (upper - lower), offset = 0.5 * (upper + lower) - box.centre;
         for (int k = 0; k < 3; ++k) {

@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <limits>
@@ -20,7 +19,7 @@
 #include "sdf/base/progress.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/bvh/winding_number.h"
-#include "sdf/sign/closest_side.h"
+#include "sdf/sign/distance_to_triangles.h"
 #include "sdf/sign/winding_slope.h"
 
 namespace bilayer::detail {
@@ -101,22 +100,8 @@ class Search {
         return {cube.centre + step, half, distance(cube.centre + step, cube.distance + glm::length(step))};
     }
 
-    /// Returns the distance to the nearest triangle, which is at most `bound`.
     double distance(const glm::dvec3& point, double bound) const {
-        tree_.descend(
-            [&](const Bounds& box) {
-                const glm::dvec3 across =
-                    glm::max(glm::max(glm::dvec3(box.lower) - point, point - glm::dvec3(box.upper)), glm::dvec3(0));
-                return glm::length(across) <= bound;
-            },
-            [&](unsigned triangle) {
-                const glm::uvec3& t = mesh_.triangles[triangle];
-                const TriangleCorners corners{glm::dvec3(mesh_.points[t.x]) - point,
-                                              glm::dvec3(mesh_.points[t.y]) - point,
-                                              glm::dvec3(mesh_.points[t.z]) - point};
-                bound = std::min(bound, glm::length(closestToOrigin(corners)));
-            });
-        return bound;
+        return distanceToTriangles(mesh_, tree_, point, bound);
     }
 
     /// Returns whether the winding number may be one half somewhere in a cube, other than by a jump across a surface.

@@ -10,6 +10,7 @@
 #include <random>
 
 #include <bilayer/collider/contact.h>
+#include "collider/contact/collider_data.h"
 #include "collider/contact/convex.h"
 #include "collider/contact/narrow_phase.h"
 #include "demos/shared/exact_distance.h"
@@ -188,6 +189,37 @@ TEST_CASE("Contacts of solids of revolution are finite in all orientations") {
         }
     }
     CHECK(found > 4000);
+}
+
+TEST_CASE("A flat end above a flat face has the face's normal at each contact, also next to its rim") {
+    const auto plate = exactBox({0.6f, 0.6f, 0.1f}, h);
+    const float radius = 0.15f, height = 0.1f;
+    const Convex cylinder = convexOf(btCylinderShapeZ({radius, radius, height}));
+    const unsigned start = seed();
+    CAPTURE(start);
+    std::mt19937 random(start);
+    std::uniform_real_distribution<float> part(0, 1);
+    std::vector<glm::vec3> onTop;
+    for (const SurfacePoint& point : plate->data().points().points())
+        if (point.normal.z > 0.9999f && std::max(std::abs(point.position.x), std::abs(point.position.y)) < 0.2f)
+            onTop.push_back(point.position);
+    REQUIRE(onTop.size() > 20);
+    std::size_t found = 0;
+    for (int i = 0; i < 2000; ++i) {
+        // the rim passes next to a surface point, by a tenth of a voxel and less
+        const float angle = 6.28f * part(random), beyond = radius + 0.1f * h * std::pow(10.f, -4 * part(random));
+        const float gap = 0.5f * h * part(random);
+        const glm::vec3 place = onTop[random() % onTop.size()] +
+                                glm::vec3(beyond * std::cos(angle), beyond * std::sin(angle), height + gap);
+        std::vector<Contact> contacts;
+        collideConvex(cylinder, {place}, {{0, 0, -1.1f * gap}}, {*plate, {}}, {.margin = h}, contacts);
+        for (const Contact& contact : contacts) {
+            CAPTURE(i, gap, beyond - radius, contact.distance, contact.feature, contact.normal.x, contact.normal.y);
+            REQUIRE(glm::length(glm::vec2(contact.normal)) < 2e-3f);
+        }
+        found += contacts.size();
+    }
+    CHECK(found > 8000);
 }
 
 TEST_CASE("Convex vertices below faces have the right penetration depth, and each kept contact reaches the solver") {

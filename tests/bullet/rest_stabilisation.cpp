@@ -120,7 +120,11 @@ TEST_CASE("A body that wakes up is where it fell asleep") {
     Heap heap(start);
     const WorldExtensions still(heap.world.dynamics, resting);
     heap.settle();
-    for (btRigidBody* ring : heap.rings) ring->forceActivationState(ISLAND_SLEEPING);
+    std::vector<btVector3> asleep;
+    for (btRigidBody* ring : heap.rings) {
+        ring->forceActivationState(ISLAND_SLEEPING);
+        asleep.push_back(ring->getCenterOfMassPosition());
+    }
     heap.world.run(0.5f);
     if (byIsland) {
         heap.rings[0]->forceActivationState(DISABLE_DEACTIVATION);
@@ -128,9 +132,12 @@ TEST_CASE("A body that wakes up is where it fell asleep") {
         REQUIRE(std::count_if(heap.rings.begin(), heap.rings.end(), [](auto* ring) { return ring->isActive(); }) > 1);
     }
     for (btRigidBody* ring : heap.rings) ring->forceActivationState(DISABLE_DEACTIVATION);
-    heap.world.run(1 / 240.f);
+    // bodies that Bullet woke have no weight for a step, and some of them get a speed that is gone some steps later
+    heap.world.run(10 / 240.f);
     CHECK(still.restingBodies() + 2 >= int(heap.rings.size()));
     CHECK(heap.farthest(2) < 0.02f * h);
+    for (std::size_t i = 0; i < heap.rings.size(); ++i)
+        CHECK(asleep[i].distance(heap.rings[i]->getCenterOfMassPosition()) < 0.02f * h);
 }
 
 TEST_CASE("Rest stabilisation does not stop thrown, weightless, hanging or moved bodies") {

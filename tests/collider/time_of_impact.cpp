@@ -49,7 +49,8 @@ TEST_CASE("Moving bodies touch when samples of their motion say so, and never pa
     const Collider shapes[] = {colliderOf(shapes::torus(0.5f, 0.2f, 12, 8)),
                                colliderOf(shapes::box({0.4f, 0.3f, 0.02f})), colliderOf(shapes::sphere(0.4f, 1))};
     int hits = 0, misses = 0;
-    for (int round = 0; round < 150; ++round) {
+    // one round in nine misses, so a few seeds need more rounds
+    for (int round = 0; round < 150 || (misses <= 10 && round < 300); ++round) {
         Placed a{shapes[round % 3], randomPose(random, 0), float(random(0.5, 2))};
         Placed b{shapes[round / 3 % 3], randomPose(random, 3), float(random(0.5, 2))};
         // towards each other, some at many sizes a step, so that they meet, graze, or miss

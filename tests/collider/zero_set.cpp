@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays and spheres against fields without meshes: the zero set of the interpolant.
+// Rays, spheres and nearest points of fields without meshes: the zero set of the interpolant.
 #include <oneapi/tbb/parallel_for.h>
 
 #include <catch2/catch.hpp>
@@ -8,6 +8,7 @@
 #include <limits>
 
 #include <bilayer/collider/field.h>
+#include "collider/field/zero_search.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"
@@ -15,6 +16,7 @@
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {
@@ -23,7 +25,53 @@ constexpr double h = 0.02;  // of most fields here [m]
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float notANumber = std::numeric_limits<float>::quiet_NaN();
 
+// The distance of the nearest zero, with a count of the bounds that its search computes.
+struct CountedNearest {
+    glm::dvec3 point;
+    double best = std::numeric_limits<double>::infinity();
+    std::size_t* bounds;
+
+    double limit(const SearchTolerance& tolerance) const { return best - tolerance.value(); }
+    double bound(const glm::dvec3& lower, const glm::dvec3& upper) const {
+        ++*bounds;
+        return glm::distance(point, glm::clamp(point, lower, upper));
+    }
+    double bound(const glm::dvec3& lower, const glm::dvec3& upper, const LinearBound& linear) const {
+        const double slab = (std::abs(linear.at(point)) - linear.error) / glm::length(linear.gradient);
+        return std::max(bound(lower, upper), slab);
+    }
+    void offer(const glm::dvec3& zero) { best = std::min(best, glm::distance(point, zero)); }
+    void settle(double key, const glm::dvec3&) { best = std::min(best, key); }
+};
+
 }  // namespace
+
+TEST_CASE("the nearest zero is found in time where all of the surface is equally near") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const double voxels : {16., 40., 100.}) {  // radius
+        const glm::dvec3 centre = h * glm::dvec3(random.point(1));
+        const Field field(levelSetOf(sphereSolid(voxels * h, centre), h), options);
+        const double cells = 1.5 * 4 * 3.14159 * voxels * voxels;  // that contain surface
+        for (const double off : {0., 1e-5, 1e-3, 0.03, 1., 0.9 * voxels}) {
+            const glm::vec3 point(centre + off * h * glm::dvec3(random.direction()));
+            std::size_t bounds = 0;
+            CountedNearest nearest{.point = field.data().toLocal(point), .bounds = &bounds};
+            ZeroSearch(field.data(), nearest).run();
+            const double truth = voxels - glm::distance(glm::dvec3(point), centre) / h;
+            CAPTURE(voxels, off, bounds, cells);
+            CHECK(double(bounds) < 10 * cells + 2e5);
+            // the interpolant of a convex surface lies on one side of it, by 3/8 of its curvature at most
+            CHECK(nearest.best == Approx(truth).margin(0.02 + 0.4 / voxels));
+            const ClosestPoint closest = field.closest(point);
+            REQUIRE(closest.found);
+            CHECK(double(closest.distance) / h == Approx(-truth).margin(0.02 + 0.4 / voxels));
+            CHECK(std::abs(field.distance(closest.position)) < 2e-3 * h);
+        }
+    }
+}
 
 TEST_CASE("rays hit a sphere and a box at the analytic distance") {
     const unsigned seed = test::seed();

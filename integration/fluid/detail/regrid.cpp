@@ -19,6 +19,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/surface.h>
+#include "integration/fluid/detail/lattice_cover.h"
 #include "integration/fluid/detail/placement.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
@@ -42,7 +43,7 @@ constexpr float minFieldWidth = 1;   // [field voxels] on either side; a narrowe
 constexpr float rounding = 1e-5f;    // tolerance of a width that is a whole number of voxels
 constexpr double sameVoxels = 1e-6;  // relative tolerance of equal voxel sizes
 constexpr double maxHoleWidth = 2;   // [voxels]; wider holes are not closed
-constexpr double spareWidth = 1e-3;  // relative: what other voxels may change in the width of a hole by rounding
+constexpr double spareWidth = 1e-3;  // relative: what other voxels may change in a width by rounding
 
 // A mesh in voxels near the origin, where floats are most precise, and its translation by whole leaves.
 struct Placed {
@@ -118,10 +119,22 @@ std::string text(const openvdb::Vec3d& v) {
     return fmt::format("({:g}, {:g}, {:g})", v.x(), v.y(), v.z());
 }
 
+// The unit of the last of three digits.
+double lastDigit(double value) {
+    return std::pow(10, std::floor(std::log10(value)) - 2);
+}
+
 // The next number of three digits.
 double roundedUp(double value) {
-    const double unit = std::pow(10, std::floor(std::log10(value)) - 2);
-    return std::ceil(value / unit) * unit;
+    return std::ceil(value / lastDigit(value)) * lastDigit(value);
+}
+double roundedDown(double value) {
+    return std::floor(value / lastDigit(value)) * lastDigit(value);
+}
+
+// A point of a placed mesh in world coordinates [m].
+openvdb::Vec3d inWorld(const glm::dvec3& point, const Placed& body, const Transform& voxels) {
+    return voxels.indexToWorld(openvdb::Vec3d(point.x, point.y, point.z) + body.shift.asVec3d());
 }
 
 [[noreturn]] void refuseWithoutInside(const std::string& why) {
@@ -137,12 +150,33 @@ void requireSolid(const Placed& body, const Transform& voxels, Progress& progres
     const Hole hole = widestHole(choice.repaired ? *choice.repaired : body.mesh, maxHoleWidth, &progress);
     if (hole.width == 0) return;
     const double voxel = voxels.voxelSize()[0];
-    const openvdb::Vec3d centre(hole.centre.x, hole.centre.y, hole.centre.z);
     throw std::invalid_argument(fmt::format(
         "the mesh is open: its widest hole, around {}, is {:.3g} wide; {:g} voxels of {:g} are closed: close it in the "
         "mesh, or take voxels of {:.3g} or more",
-        text(voxels.indexToWorld(centre + body.shift.asVec3d())), hole.width * voxel, maxHoleWidth, voxel,
+        text(inWorld(hole.centre, body, voxels)), hole.width * voxel, maxHoleWidth, voxel,
         roundedUp((1 + spareWidth) * hole.width * voxel / maxHoleWidth)));
+}
+
+bool reachesDepth(const FloatGrid& grid, float depth) {
+    for (auto value = grid.tree().cbeginValueAll(); value; ++value)
+        if (*value <= -depth) return true;
+    return false;
+}
+
+// Refuses a body that is so thin everywhere that it may lie between voxels. Depends on the body alone, not on the
+// positions of the voxels: where one of them is that deep, the cover is complete.
+void requireWide(const LevelSet& field, const Placed& body, const Transform& voxels, Progress& progress) {
+    if (reachesDepth(*field.grids().distance, float(coveringWidth / 2))) return;
+    const Mesh outward = outwardMesh(field, body.mesh);
+    const LatticeCover cover(outward, &progress);
+    if (cover.isComplete()) return;
+    const WidePlace widest = cover.widestPlace();
+    if (!(widest.width > 0)) refuseWithoutInside("no ball fits into it");
+    const double voxel = voxels.voxelSize()[0], size = widest.width * voxel;
+    throw std::invalid_argument(fmt::format(
+        "the body is too thin for these voxels and may lie between them: its widest place, around {}, is {:.3g} wide, "
+        "and voxels are {:.3g}: make it thicker, or take voxels of {:.3g} or less",
+        text(inWorld(widest.centre, body, voxels)), size, voxel, roundedDown((1 - spareWidth) * size / coveringWidth)));
 }
 
 }  // namespace
@@ -170,6 +204,7 @@ FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transf
                                                .unite = uniteSolids,
                                                .progress = progress});
     if (field.sign() == byFlood) refuseWithoutInside(field.signReason());
+    requireWide(field, placed, voxels, choosing);
     const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);
     grid->setTransform(voxels.copy());
     return grid;
