@@ -22,6 +22,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
+#include "tests/collider/mass_formulas.h"
 #include "tests/support/analytic.h"
 #include "tests/support/cells.h"
 #include "tests/support/clean.h"
@@ -63,34 +64,6 @@ void requireMass(const MassProperties& mass, const MassProperties& formula, doub
     requireNear(mass.inertia, formula.inertia, part * double(formula.principalInertia.z));
     requireNear(mass.principalInertia, formula.principalInertia, part * double(formula.principalInertia.z));
     requireDiagonalises(mass);
-}
-
-// By formula; the moments are those about x, y and z.
-MassProperties massOf(double volume, const glm::vec3& moments, const glm::vec3& centre = glm::vec3(0)) {
-    MassProperties mass;
-    mass.volume = volume;
-    mass.centre = centre;
-    for (int axis = 0; axis < 3; ++axis) mass.inertia[axis][axis] = moments[axis];
-    mass.principalInertia = moments;
-    std::sort(&mass.principalInertia.x, &mass.principalInertia.x + 3);
-    return mass;
-}
-
-MassProperties ballMass(double radius, const glm::vec3& centre = glm::vec3(0)) {
-    const double volume = 4. / 3 * pi * radius * radius * radius;
-    return massOf(volume, glm::vec3(0.4 * volume * radius * radius), centre);
-}
-
-MassProperties boxMass(const glm::dvec3& half) {
-    const double volume = 8 * half.x * half.y * half.z;
-    const glm::dvec3 squared = half * half;
-    return massOf(volume, volume / 3 * (glm::dvec3(squared.x + squared.y + squared.z) - squared));
-}
-
-MassProperties torusMass(double major, double minor) {
-    const double volume = 2 * pi * pi * major * minor * minor;
-    const double across = volume * (0.5 * major * major + 0.625 * minor * minor);
-    return massOf(volume, glm::dvec3(across, across, volume * (major * major + 0.75 * minor * minor)));
 }
 
 // The field with a modified copy of the grid.
