@@ -15,6 +15,7 @@
 #include "sdf/fill/layer_block.h"
 #include "sdf/fill/layer_samples.h"
 #include "sdf/fill/triangle_bins.h"
+#include "sdf/leaf/build_options.h"
 
 namespace bilayer::detail {
 namespace {
@@ -36,6 +37,7 @@ class LayerBrickFiller {
 
     void fill(std::size_t brick) {
         const glm::ivec3 origin = bins_.origins[brick];
+        if (job_.wanted && !job_.wanted(origin, bins_.side)) return;
         sample(brick, origin);
         const int blocks = bins_.side / blockSide;
         s_.origins.clear();
@@ -57,6 +59,7 @@ class LayerBrickFiller {
     }
 
     void fillBlock(const glm::ivec3& origin, const glm::ivec3& inBrick) {
+        if (job_.wanted && !job_.wanted(origin + inBrick, blockSide)) return;
         job_.progress.poll();
         const std::size_t first = s_.origins.size() * blockVoxels;
         if (s_.distances.size() == first) s_.distances.resize(first + blockVoxels);
@@ -78,8 +81,7 @@ class LayerBrickFiller {
 
 void fillDoubleLayer(const MeshJob& job, const Bounds& box, const DoubleLayerOptions& options,
                      const FillParameters& parameters) {
-    // The corners of the paper's cube lie outside the ball.
-    const float reach = parameters.reach * (parameters.cube > 0 ? std::sqrt(3.f) : 1.f);
+    const float reach = layerReach(parameters);
     const TriangleBins bins = binTriangles(job.mesh, box, 1.0 / double(job.voxelSize), reach, &job.progress);
     job.progress.begin(bins.count());
     tbb::enumerable_thread_specific<LayerBrickScratch> scratch;

@@ -73,6 +73,13 @@ bool isPlain(const BandMasks& masks) {
     });
 }
 
+BlockMask activeOf(const Leaf& leaf) {
+    BlockMask active;
+    for (openvdb::Index word = 0; word < blockSide; ++word)
+        active[word] = leaf.getValueMask().getWord<std::uint64_t>(word);
+    return active;
+}
+
 // Pairs of voxels across a face of a block. The block's own voxels are at first + i * rowStep + j * step, their
 // partners at an offset of `across`.
 struct BlockFace {
@@ -87,8 +94,10 @@ const BlockFace forwardFaces[3] = {{{blockSide, 0, 0}, lastLayer* xStep, yStep, 
 // Compares distances only where the bits of two faces differ, that is, where the surface passes between them.
 class ConflictCounter {
   public:
-    ConflictCounter(const openvdb::FloatTree& tree, const std::vector<FaceBits>& faces, float voxelSize)
-        : tree_(tree), faces_(faces), voxel_(voxelSize) {}
+    /// @param part  null: the whole field
+    ConflictCounter(const openvdb::FloatTree& tree, const std::vector<FaceBits>& faces, float voxelSize,
+                    const FieldPart* part)
+        : tree_(tree), faces_(faces), voxel_(voxelSize), part_(part) {}
 
     std::size_t count() const {
         const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(tree_);
@@ -101,7 +110,7 @@ class ConflictCounter {
                        return sum;
                    },
                    std::plus<>()) +
-               atLargeTiles();
+               (part_ ? atOuterFaces() : atLargeTiles());
     }
 
   private:
@@ -114,6 +123,22 @@ class ConflictCounter {
                 if (node->isChildMaskOff(n) && node->getTable()[n].getValue() < 0)
                     sum += towardsOutside(node->offsetToGlobalCoord(n));
         return sum;
+    }
+
+    // An inside-out mesh shows inside voxels where the lattice of all parts ends.
+    std::size_t atOuterFaces() const {
+        const FaceSides sides = faceSides(tree_, *part_);
+        std::size_t sum = 0;
+        for (int face = 0; face < 6; ++face) {
+            const int end = face < 3 ? -part_->own.first[face] : part_->own.end[face - 3];
+            sum += end >= unbounded && sides[std::size_t(face)].inside;
+        }
+        return sum;
+    }
+
+    // Returns whether the pairs with this lower block are counted.
+    bool counts(const openvdb::Coord& lower) const {
+        return !part_ || part_->own.contains({lower.x(), lower.y(), lower.z()});
     }
 
     std::size_t towardsOutside(const openvdb::Coord& tile) const {
@@ -137,12 +162,15 @@ class ConflictCounter {
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const BlockFace& face = forwardFaces[axis];
             const openvdb::Coord next = leaf.origin() + face.toNeighbour, previous = leaf.origin() - face.toNeighbour;
-            if (const Leaf* other = accessor.probeConstLeaf(next))
+            const Leaf* other = accessor.probeConstLeaf(next);
+            if (!counts(leaf.origin())) {
+                // a neighbouring part counts them
+            } else if (other)
                 sum += between(face, bits[axis + 3] ^ faces_[other->transientData()][axis], values + face.first,
                                other->buffer().data() + face.first + face.across);
             else
                 sum += towards(face, bits[axis + 3], values + face.first, accessor.getValue(next));
-            if (!accessor.probeConstLeaf(previous))
+            if (counts(previous) && !accessor.probeConstLeaf(previous))
                 sum += towards(face, bits[axis], values + face.first + face.across, accessor.getValue(previous));
         }
         return sum;
@@ -174,6 +202,7 @@ class ConflictCounter {
     const openvdb::FloatTree& tree_;
     const std::vector<FaceBits>& faces_;
     float voxel_;
+    const FieldPart* part_;
 };
 
 }  // namespace
@@ -191,7 +220,7 @@ void Assembler::take(const FilledBlocks& blocks) {
         Leaf::NodeMaskType mask;
         for (openvdb::Index word = 0; word < blockSide; ++word) mask.getWord<std::uint64_t>(word) = masks.active[word];
         leaf->setValueMask(mask);
-        if (wantTriangles_ && !mask.isOff())
+        if (wantTriangles_ && !mask.isOff() && (!part_ || part_->own.contains(o)))
             triangleLeaves_.local().push_back(triangleLeaf(blocks.triangles.data() + b * blockVoxels, *leaf));
         leaves.push_back({std::move(leaf), facesOf(masks.inside), plain});
     }
@@ -207,7 +236,8 @@ void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::
         });
     };
     forEachKept(from.distance->tree(), [&](const Leaf& leaf) {
-        leaves_.local().push_back({std::make_unique<Leaf>(leaf), facesOf(insideOf(leaf)), false});
+        const BlockMask inside = insideOf(leaf);
+        leaves_.local().push_back({std::make_unique<Leaf>(leaf), facesOf(inside), isPlain({activeOf(leaf), inside})});
     });
     if (wantTriangles_)
         forEachKept(from.triangle->tree(), [&](const TriangleGridLeaf& leaf) {
@@ -257,7 +287,10 @@ void Assembler::grow(Branch& branch, float background) {
 }
 
 openvdb::FloatGrid::Ptr Assembler::distances() {
-    const float exterior = widths_.exterior * widths_.voxelSize, interior = -widths_.interior * widths_.voxelSize;
+    return distances(widths_.exterior * widths_.voxelSize, -widths_.interior * widths_.voxelSize);
+}
+
+openvdb::FloatGrid::Ptr Assembler::distances(float exterior, float interior) {
     auto grid = openvdb::FloatGrid::create(exterior);
     std::vector<Branch> branches = this->branches();
     if (!branches.empty()) faces_.resize(branches.back().firstFaces + branches.back().leaves.size());
@@ -273,15 +306,19 @@ openvdb::FloatGrid::Ptr Assembler::distances() {
         if (!grid->tree().probeNode<LargeNode>(origin)) grid->tree().root().addChild(new LargeNode(origin, exterior));
         grid->tree().probeNode<LargeNode>(origin)->addChild(branch.owned.release());
     }
-    // leaves already have signs, so only tiles between them are flooded; uniform leaves beyond the band become tiles
-    // too
-    openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
-    forEachBranch([](Branch& branch) {
-        for (const Leaf* leaf : branch.plain) {
-            const float value = leaf->getFirstValue();  // remove the leaf before its tile is added
-            branch.node->addTile(1, leaf->origin(), value, false);
-        }
-    });
+    if (part_) {
+        floodPart(grid->tree(), *part_, exterior, interior);
+    } else {
+        // leaves already have signs, so only tiles between them are flooded; uniform leaves beyond the band become
+        // tiles too
+        openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
+        forEachBranch([](Branch& branch) {
+            for (const Leaf* leaf : branch.plain) {
+                const float value = leaf->getFirstValue();  // remove the leaf before its tile is added
+                branch.node->addTile(1, leaf->origin(), value, false);
+            }
+        });
+    }
     openvdb::tools::pruneTiles(grid->tree());
     grid->setName("distance");
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -302,7 +339,7 @@ openvdb::Int32Grid::Ptr Assembler::triangles() {
 }
 
 std::size_t Assembler::conflicts(const openvdb::FloatGrid& distances) const {
-    return ConflictCounter(distances.tree(), faces_, float(distances.voxelSize()[0])).count();
+    return ConflictCounter(distances.tree(), faces_, float(distances.voxelSize()[0]), part_).count();
 }
 
 }  // namespace bilayer::detail

@@ -12,6 +12,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/openvdb.h"
+#include "sdf/grid/field_part.h"
 #include "sdf/leaf/band.h"
 #include "sdf/leaf/blocks.h"
 
@@ -34,19 +35,23 @@ class Assembler {
 
     /// @param triangles  whether blocks include their nearest triangles
     /// @param progress   polled while leaves are joined
-    Assembler(const BandWidths& widths, bool triangles, Plain plain, Progress& progress)
-        : widths_(widths), wantTriangles_(triangles), plain_(plain), progress_(progress) {}
+    /// @param part      the part of the field that is filled; null: all of it
+    Assembler(const BandWidths& widths, bool triangles, Plain plain, Progress& progress,
+              const FieldPart* part = nullptr)
+        : widths_(widths), wantTriangles_(triangles), plain_(plain), progress_(progress), part_(part) {}
 
     /// Adds filled blocks. Thread-safe.
     void take(const FilledBlocks& blocks);
 
-    /// Copies the leaves of an earlier result whose origins satisfy `keep`, which is called concurrently from all
-    /// threads.
+    /// Copies the leaves of an earlier result, or of a part, whose origins satisfy `keep`, which is called concurrently
+    /// from all threads.
     void copy(const Grids& from, const std::function<bool(const openvdb::Coord&)>& keep);
 
     /// Builds the level set of all blocks, with signs in the space between them. Call it once, after the last block.
-    /// Throws Cancelled.
+    /// A part keeps blocks that have no voxel in the band, which the whole field needs for its signs. Throws Cancelled.
     openvdb::FloatGrid::Ptr distances();
+    /// The same with the values of space as they are stored, whose widths in voxels are not known exactly [m].
+    openvdb::FloatGrid::Ptr distances(float exterior, float interior);
 
     /// Builds the grid of nearest triangles of the active voxels; null unless requested. Call it once. Throws
     /// Cancelled.
@@ -55,7 +60,8 @@ class Assembler {
     /// Counts the sign conflicts in the result of distances(): pairs of neighbouring voxels on different sides whose
     /// distances sum to more than one voxel, so that no surface fits between them. The field of a closed, oriented mesh
     /// without self-intersections has none. Only pairs in different blocks count; completeSides() in sign_propagation.h
-    /// reports the conflicts within a block. The space outside of all blocks must be outside.
+    /// reports the conflicts within a block. The space outside of all blocks must be outside. A part counts the pairs
+    /// whose lower voxel is its own.
     std::size_t conflicts(const openvdb::FloatGrid& distances) const;
 
   private:
@@ -77,6 +83,7 @@ class Assembler {
     bool wantTriangles_;
     Plain plain_;
     Progress& progress_;
+    const FieldPart* part_;
     PerThread<Collected> leaves_;
     PerThread<std::unique_ptr<TriangleGridLeaf>> triangleLeaves_;
     std::vector<FaceBits> faces_;  // of each leaf; the leaf's transient data is the index

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <stdexcept>
 
+#include <bilayer/sdf/grids.h>
 #include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/grid/field_filler.h"
@@ -15,6 +16,7 @@
 #include "sdf/grid/sign_retry.h"
 #include "sdf/leaf/blocks.h"
 #include "sdf/leaf/build_options.h"
+#include "sdf/sign/sign_choice.h"
 
 namespace bilayer::detail {
 namespace {
@@ -57,6 +59,19 @@ LevelSet buildField(const Mesh& mesh, const BuildOptions& options, const DeviceF
         FieldFiller field(mesh, options, device);
         fillWhole(field);
         return field.levelSet();
+    });
+}
+
+FilledPart buildPart(const Mesh& mesh, const BuildOptions& options, const FieldPart& part) {
+    checkOptions(options);
+    openvdb::initialize();
+    return withThreads(options.threads, [&] {
+        FieldFiller field(mesh, options, nullptr, &part);
+        if (hasOwnSigns(options.method))
+            field.fillWithOwnSigns();
+        else
+            field.fill(mesh, options.sign, asAskedFor, options.method);
+        return FilledPart{field.grids(), field.signs().conflicts, field.faces()};
     });
 }
 

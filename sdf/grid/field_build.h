@@ -3,12 +3,15 @@
 // Tested by tests/sdf/build.cpp and tests/sdf/rebuild.cpp through build().
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/options.h>
+#include "sdf/grid/field_part.h"
 
 namespace bilayer::detail {
 
@@ -21,6 +24,19 @@ LevelSet buildField(const Mesh& mesh, const BuildOptions& options, const DeviceF
 /// Updates a field, as rebuild() documents.
 LevelSet rebuildField(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh,
                       std::span<const std::uint32_t> moved, const BuildOptions& options);
+
+/// The outcome of buildPart().
+struct FilledPart {
+    std::shared_ptr<Grids> grids;  ///< possibly without any leaf
+    std::size_t conflicts = 0;     ///< with a conflict, the signs are not those of the whole field
+    FaceSides faces{};
+};
+
+/// Builds a part of a field from the triangles near it.
+/// @param options  for which triangles near a block determine the block: Method::doubleLayer, or Method::exact with
+///                 Sign::normals
+/// Throws as build() does, and std::invalid_argument where only the whole mesh can decide a sign.
+FilledPart buildPart(const Mesh& mesh, const BuildOptions& options, const FieldPart& part);
 
 /// Fills the blocks of a mesh's field as build() does, but builds no level set: the device keeps its results. Fills
 /// again by another sign method if the device counts conflicts. Throws as build() does.

@@ -47,15 +47,23 @@ Assembler::Plain plainBlocks(const BuildOptions& options, Sign sign) {
 
 }  // namespace
 
-FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device)
-    : mesh_(mesh), options_(options), device_(device), progress_(options.progress) {
+FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device,
+                         const FieldPart* part)
+    : mesh_(mesh), options_(options), device_(device), part_(part), progress_(options.progress) {
     progress_.poll();
     validate(mesh_);
     progress_.poll();
     extent_ = extentOf(mesh_);
     const bool layers = options_.method == Method::doubleLayer;
     checkSize(mesh_, extent_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
+    if (part_) extent_.box = part_->mesh;
     progress_.poll();
+}
+
+void FieldFiller::restrict(MeshJob& job) const {
+    if (!part_) return;
+    job.isPart = true;
+    job.wanted = [box = part_->filled()](const glm::ivec3& first, int side) { return box.overlaps(first, side); };
 }
 
 void FieldFiller::fillWithOwnSigns() {
@@ -67,17 +75,18 @@ void FieldFiller::fillWithOwnSigns() {
         signs_ = {layerSigns, "the nearer of two layers tells the side"};
     FillParameters parameters = fillParameters(options_);
     if (prism) parameters.reach = reachOf(options_, Sign::normals);
-    Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
+    Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_, part_);
     std::atomic<std::size_t> undecided = 0;
-    const MeshJob job{mesh_,
-                      options_.voxelSize,
-                      parameters.reach,
-                      options_.triangles,
-                      true,
-                      [&](const FilledBlocks& blocks) { take(assembler, blocks); },
-                      progress_,
-                      {},
-                      &undecided};
+    MeshJob job{mesh_,
+                options_.voxelSize,
+                parameters.reach,
+                options_.triangles,
+                true,
+                [&](const FilledBlocks& blocks) { take(assembler, blocks); },
+                progress_,
+                {},
+                &undecided};
+    restrict(job);
     if (device_)
         device_->fill({job, options_, extent_.box, parameters});
     else
@@ -85,6 +94,7 @@ void FieldFiller::fillWithOwnSigns() {
     times_.fill += part.lap();
     signs_.undecided = undecided;
     finish(assembler);
+    trim();
     times_.assemble += part.lap();
 }
 
@@ -114,13 +124,14 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     const float reach = reachOf(options_, sign);
     const BandWidths widths = bandOf(options_);
     Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
-                        plainBlocks(options_, sign), progress_);
+                        plainBlocks(options_, sign), progress_, part_);
     std::atomic<std::size_t> undecided = 0, conflicts = 0;
     MeshJob job{mesh,       options_.voxelSize,
                 reach,      options_.triangles,
                 byNormals,  [&](const FilledBlocks& blocks) { take(assembler, blocks); },
                 progress_,  {},
                 &undecided, &conflicts};
+    restrict(job);
     if (adapt) adapt(job, assembler);
     // Flipping triangles does not change the bounding box.
     if (device_)
@@ -138,6 +149,7 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     signs_ = {nameOf(sign), reason, conflicts, undecided};
     const bool isKnownToBeClean = options_.inspected && options_.inspected->selfIntersections == 0;
     if (byNormals && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean) repair(mesh);
+    trim();
     times_.assemble += part.lap();
 }
 
@@ -180,12 +192,23 @@ void FieldFiller::finish(Assembler& assembler) {
     triangle_ = assembler.triangles();
 }
 
+void FieldFiller::trim() {
+    if (!part_) return;
+    faces_ = faceSides(distance_->tree(), *part_);
+    trimToPart(distance_->tree(), *part_);
+    if (triangle_) renumber(triangle_->tree(), *part_);
+}
+
 LevelSet FieldFiller::levelSet() {
-    Stopwatch part;
     if (distance_->empty() || distance_->activeVoxelCount() == 0)
         throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
     progress_.poll();
-    describe(*distance_, mesh_, options_, signs_);
+    return LevelSet(grids());
+}
+
+std::shared_ptr<Grids> FieldFiller::grids() {
+    Stopwatch part;
+    describe(*distance_, mesh_.origin, part_ ? part_->meshHash : hash(mesh_), options_, signs_);
     auto grids = std::make_shared<Grids>();
     grids->distance = distance_;
     if (triangle_) {
@@ -199,7 +222,7 @@ LevelSet FieldFiller::levelSet() {
     times_.total = total_.lap();
     times_.filledBlocks = filledBlocks_;
     grids->times = times_;
-    return LevelSet(std::move(grids));
+    return grids;
 }
 
 }  // namespace bilayer::detail

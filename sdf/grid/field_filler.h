@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include <bilayer/sdf/level_set.h>
@@ -17,6 +18,7 @@
 #include "sdf/base/stopwatch.h"
 #include "sdf/grid/assemble.h"
 #include "sdf/grid/field_metadata.h"
+#include "sdf/grid/field_part.h"
 #include "sdf/leaf/blocks.h"
 #include "sdf/leaf/build_size.h"
 
@@ -27,8 +29,10 @@ class FieldFiller {
   public:
     /// @param options  valid
     /// @param device   fills the blocks; null: the CPU
+    /// @param part     the part of the field that is filled, whose triangles are those of `mesh`; null: all of it
     /// Throws as validate() and checkSize() do. The arguments must outlive the filler.
-    FieldFiller(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device);
+    FieldFiller(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device,
+                const FieldPart* part = nullptr);
 
     /// Fills by a method that finds signs itself.
     void fillWithOwnSigns();
@@ -50,6 +54,12 @@ class FieldFiller {
     /// Returns the last field as a level set.
     LevelSet levelSet();
 
+    /// Returns the grids of the last field, which may be empty, with their metadata.
+    std::shared_ptr<Grids> grids();
+
+    /// Returns on which sides the outermost voxels of the part lie.
+    const FaceSides& faces() const { return faces_; }
+
     const Mesh& mesh() const { return mesh_; }
     const BuildOptions& options() const { return options_; }
     const Bounds& box() const { return extent_.box; }
@@ -63,15 +73,19 @@ class FieldFiller {
     void repair(const Mesh& mesh);
     void take(Assembler& assembler, const FilledBlocks& blocks);  // thread-safe
     void finish(Assembler& assembler);
+    void trim();  // to the part
+    void restrict(MeshJob& job) const;
 
     const Mesh& mesh_;
     const BuildOptions& options_;
     const DeviceFiller* device_;
+    const FieldPart* part_;
     BuildTimes times_;
     Stopwatch total_;
     Progress progress_;
     MeshExtent extent_;
     FieldSigns signs_;
+    FaceSides faces_{};
     std::atomic<std::size_t> filledBlocks_ = 0;
     openvdb::FloatGrid::Ptr distance_;
     openvdb::Int32Grid::Ptr triangle_;

@@ -14,7 +14,8 @@
 
 namespace bilayer::detail {
 
-void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& options, const FieldSigns& signs) {
+void describe(openvdb::FloatGrid& grid, const glm::dvec3& origin, std::uint64_t meshHash, const BuildOptions& options,
+              const FieldSigns& signs) {
     grid.setTransform(openvdb::math::Transform::createLinearTransform(options.voxelSize));
     grid.setName("distance");
     grid.setGridClass(openvdb::GRID_LEVEL_SET);
@@ -26,9 +27,8 @@ void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& op
     grid.insertMeta(metadata::signConflicts, openvdb::Int64Metadata(std::int64_t(signs.conflicts)));
     grid.insertMeta(metadata::signUndecided, openvdb::Int64Metadata(std::int64_t(signs.undecided)));
     grid.insertMeta(metadata::errorBound, openvdb::FloatMetadata(errorBound(options) * options.voxelSize));
-    grid.insertMeta(metadata::meshHash, openvdb::Int64Metadata(std::int64_t(hash(mesh))));
+    grid.insertMeta(metadata::meshHash, openvdb::Int64Metadata(std::int64_t(meshHash)));
     grid.insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(options.interiorWidthVoxels * options.voxelSize));
-    const glm::dvec3& origin = mesh.origin;
     if (origin != glm::dvec3(0))
         grid.insertMeta(metadata::origin, openvdb::Vec3DMetadata({origin.x, origin.y, origin.z}));
 }

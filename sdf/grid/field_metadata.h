@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 
 #include <bilayer/sdf/level_set.h>
@@ -21,9 +22,10 @@ struct FieldSigns {
 };
 
 /// Sets the name, transform and metadata of a distance grid.
-/// @param mesh     the mesh that build() was given
+/// @param origin, meshHash  of the mesh that build() was given
 /// @param options  with widths in voxels, here and below
-void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& options, const FieldSigns& signs);
+void describe(openvdb::FloatGrid& grid, const glm::dvec3& origin, std::uint64_t meshHash, const BuildOptions& options,
+              const FieldSigns& signs);
 
 /// Throws std::invalid_argument if the options and the mesh are not those of an existing field.
 void checkFieldOf(const LevelSet& field, const Mesh& mesh, const BuildOptions& options);

@@ -7,7 +7,9 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vector_relational.hpp>
 #include <span>
 #include <string>
 
@@ -17,6 +19,23 @@
 namespace bilayer::detail {
 
 class Progress;
+
+/// A box of voxels, from `first` up to `end` without it [index coordinates]. Its sides are multiples of blockSide.
+struct BlockBox {
+    glm::ivec3 first, end;
+
+    bool contains(const glm::ivec3& voxel) const {
+        return !glm::any(glm::lessThan(voxel, first)) && glm::all(glm::lessThan(voxel, end));
+    }
+    /// Returns whether the box holds any voxel of a cube.
+    bool overlaps(const glm::ivec3& lower, int side) const {
+        return glm::all(glm::lessThan(lower, end)) && glm::all(glm::greaterThan(lower + side, first));
+    }
+    BlockBox within(const BlockBox& other) const { return {glm::max(first, other.first), glm::min(end, other.end)}; }
+};
+
+/// Beyond all index coordinates: a box that ends here has no neighbour there.
+inline constexpr int unbounded = 1 << 30;
 
 inline constexpr int blockSide = 8;                                    ///< [voxels], as an OpenVDB leaf
 inline constexpr int blockVoxels = blockSide * blockSide * blockSide;  ///< voxel (x, y, z) at (x * 8 + y) * 8 + z
@@ -62,6 +81,8 @@ struct MeshJob {
     std::atomic<std::size_t>* undecided = nullptr;
     /// Counts voxels that the normals place on both sides of the surface; or null.
     std::atomic<std::size_t>* conflicts = nullptr;
+    /// The triangles are some of a larger mesh's. What all of its triangles must decide is refused.
+    bool isPart = false;
 };
 
 /// The input of a device.

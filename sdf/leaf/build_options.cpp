@@ -99,6 +99,11 @@ FillParameters fillParameters(const BuildOptions& options) {
     return {layers.delta, reach, reach - layers.delta, 0, options.triangles};
 }
 
+float layerReach(const FillParameters& parameters) {
+    // The corners of the paper's cube lie outside the ball.
+    return parameters.reach * (parameters.cube > 0 ? std::sqrt(3.f) : 1.f);
+}
+
 float errorBound(const BuildOptions& options) {
     if (options.method == Method::prism) return std::numeric_limits<float>::infinity();  // prisms leave gaps
     if (options.method != Method::doubleLayer) return exactError;

@@ -30,6 +30,9 @@ float reachOf(const BuildOptions& options, Sign sign);
 /// Returns the parameters of the double layer method.
 FillParameters fillParameters(const BuildOptions& options);
 
+/// Returns the distance up to which a triangle affects voxels in the double layer method [voxels].
+float layerReach(const FillParameters& parameters);
+
 /// Returns the maximum error of distances [voxels].
 float errorBound(const BuildOptions& options);
 

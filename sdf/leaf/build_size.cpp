@@ -30,13 +30,17 @@ constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
 double countBlocks(const Bounds& box, double area, double h, double reach) {
     const double pi = glm::pi<double>(), r = reach + 0.5 * blockSide;
     const glm::dvec3 s = glm::dvec3(box.size()) / h;
-    const double aroundSurface = 2 * r * area + 8 * pi / 3 * r * r * r;
     const double aroundBox = s.x * s.y * s.z + 2 * r * (s.x * s.y + s.y * s.z + s.z * s.x) +
                              pi * r * r * (s.x + s.y + s.z) + 4 * pi / 3 * r * r * r;
-    return std::min(aroundSurface, aroundBox) / blockVoxels;
+    return std::min(blocksAround(area, reach), aroundBox / blockVoxels);
 }
 
 }  // namespace
+
+double blocksAround(double area, double reach) {
+    const double r = reach + 0.5 * blockSide;
+    return (2 * r * area + 8 * glm::pi<double>() / 3 * r * r * r) / blockVoxels;
+}
 
 MeshExtent extentOf(const Mesh& mesh) {
     return tbb::parallel_reduce(

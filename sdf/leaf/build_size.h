@@ -19,6 +19,11 @@ struct MeshExtent {
 
 MeshExtent extentOf(const Mesh& mesh);
 
+/// Returns about how many blocks the band of a surface meets.
+/// @param area   [voxels^2]
+/// @param reach  distance up to which distances are computed [voxels]
+double blocksAround(double area, double reach);
+
 /// Returns about how much memory a build needs in addition to the mesh [bytes].
 /// @param extent  of the mesh
 /// @param reach   distance up to which distances are computed [voxels]

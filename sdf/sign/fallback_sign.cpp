@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <stdexcept>
 
 #include "sdf/base/progress.h"
 #include "sdf/sign/closest_side.h"
@@ -28,6 +29,11 @@ struct Passes {
 }  // namespace
 
 bool FallbackSign::isInside(const glm::dvec3& point) {
+    if (isPart_)
+        throw std::invalid_argument(
+            "the normals nearest to a voxel cancel out, and only the whole mesh can decide its side: build this field "
+            "in "
+            "one piece");
     if (asked_) ++*asked_;
     // Isolated: a waiting thread must not take a task that would wait for the same flag.
     std::call_once(looked_, [&] {

@@ -21,9 +21,10 @@ class FallbackSign {
         : mesh_(job.mesh),
           progress_(job.progress),
           asked_(job.undecided),
+          isPart_(job.isPart),
           reach_(double(job.reach) * double(job.voxelSize)) {}
 
-    /// Returns whether a point is inside [m]. Throws Cancelled.
+    /// Returns whether a point is inside [m]. Throws Cancelled, and std::invalid_argument for a part of a mesh.
     bool isInside(const glm::dvec3& point);
 
   private:
@@ -32,6 +33,7 @@ class FallbackSign {
     const Mesh& mesh_;
     Progress& progress_;
     std::atomic<std::size_t>* asked_;
+    bool isPart_;
     double reach_;  // maximum distance of queried points from the mesh [m]
     std::once_flag looked_, made_;
     bool closed_ = false;

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 /// The private folders of a library from the bottom layer up: none may include a later one.
 inline const std::map<std::string, std::vector<std::string>> floors{
-    {"sdf", {"base", "leaf", "bvh", "io", "mesh", "sign", "fill", "grid"}},
+    {"sdf", {"base", "leaf", "bvh", "io", "mesh", "sign", "fill", "grid", "tiles"}},
     {"collider", {"field", "contact"}},
     {"cl", {"detail"}},
     {"integration/bullet", {"detail"}},

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sdf/tiles/tile_build.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "sdf/base/openvdb.h"
+#include "sdf/grid/field_build.h"
+#include "sdf/leaf/build_options.h"
+#include "sdf/leaf/build_size.h"
+
+namespace bilayer::detail {
+namespace {
+
+/// Memory of a process that holds no tile: the program, its libraries, and the counters of all bricks [bytes].
+constexpr double bytesOfProcess = 160e6;
+/// Memory per triangle: as read, as a mesh, in bins, and in the cells of bricks [bytes].
+constexpr double bytesPerTriangle = 240;
+/// Memory per block: a leaf, its place in the tree, its compressed form, and the bytes of the file [bytes].
+constexpr double bytesPerBlock = 5000;
+
+Mesh meshOf(std::span<const TileTriangle> triangles, const glm::dvec3& origin) {
+    Mesh mesh;
+    mesh.origin = origin;
+    mesh.points.reserve(3 * triangles.size());
+    mesh.triangles.reserve(triangles.size());
+    for (const TileTriangle& t : triangles) {
+        mesh.triangles.push_back(unsigned(mesh.points.size()) + glm::uvec3(0, 1, 2));
+        mesh.points.insert(mesh.points.end(), t.corners, t.corners + 3);
+    }
+    return mesh;
+}
+
+}  // namespace
+
+BuiltTile buildTile(std::span<const TileTriangle> triangles, const MeshFacts& facts, const Tiling& tiling,
+                    std::size_t tile, const BuildOptions& options) {
+    if (triangles.empty()) return {};
+    std::vector<std::uint32_t> numbers(triangles.size());
+    std::transform(triangles.begin(), triangles.end(), numbers.begin(), [](const auto& t) { return t.number; });
+    const Mesh mesh = meshOf(triangles, facts.origin);
+    const FieldPart part{facts.box, facts.hash, tiling.lattice(), tiling.own(tile), numbers};
+    FilledPart filled = buildPart(mesh, options, part);
+    if (filled.conflicts > 0)
+        throw std::invalid_argument(fmt::format(
+            "the normals contradict each other at {} places of one tile, and only the whole mesh can decide the sides: "
+            "build this field in one piece",
+            filled.conflicts));
+    if (filled.grids->distance->tree().leafCount() == 0) return {};
+    return {std::move(filled.grids), filled.faces};
+}
+
+double tileBytes(std::uint64_t triangles, double area, const Tiling& tiling, std::size_t tile,
+                 const BuildOptions& options) {
+    const TriangleLimits limits = tiling.limits(tile);
+    const glm::dvec3 side = limits.upper - limits.lower;
+    const double blocks = std::min(side.x * side.y * side.z / blockVoxels, blocksAround(area, double(tiling.reach())));
+    return bytesOfProcess + double(triangles) * bytesPerTriangle + blocks * bytesPerBlock * (options.triangles ? 2 : 1);
+}
+
+}  // namespace bilayer::detail

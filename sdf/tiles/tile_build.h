@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Builds one tile of a field from the triangles near it.
+// Tested by tests/sdf/field_tiles.cpp.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/options.h>
+#include "sdf/grid/field_part.h"
+#include "sdf/tiles/tiling.h"
+
+namespace bilayer::detail {
+
+/// A triangle as tiles store it.
+struct TileTriangle {
+    std::uint32_t number;  ///< in the whole mesh
+    glm::vec3 corners[3];  ///< [m]
+};
+static_assert(sizeof(TileTriangle) == 40, "files of triangles have no gaps");
+
+/// The whole mesh, as far as a tile must know it.
+struct MeshFacts {
+    Bounds box;
+    glm::dvec3 origin{0};
+    std::uint64_t hash = 0;  ///< 0: not known
+    std::uint64_t triangles = 0;
+};
+
+struct BuiltTile {
+    /// Equal those of the whole field in the tile's box. Outside of it, all is space outside the surface. Blocks
+    /// without a voxel in the band are leaves if the whole field needs them for its signs. Null if no leaf is in the
+    /// box.
+    std::shared_ptr<Grids> grids;
+    FaceSides faces{};  ///< without a grid, none
+};
+
+/// Builds a tile. Its bytes are those of the whole field.
+/// @param triangles  those that Tiling::forEachTileOf() gives the tile, in the order of the mesh
+/// @param options    valid and local
+/// Throws as build() does. Throws std::invalid_argument if only the whole mesh can decide a sign: where the normals
+/// cancel out or contradict each other.
+BuiltTile buildTile(std::span<const TileTriangle> triangles, const MeshFacts& mesh, const Tiling& tiling,
+                    std::size_t tile, const BuildOptions& options);
+
+/// Returns about how much memory a tile needs [bytes].
+/// @param area  of the tile's triangles within its limits [voxels^2]
+double tileBytes(std::uint64_t triangles, double area, const Tiling& tiling, std::size_t tile,
+                 const BuildOptions& options);
+
+}  // namespace bilayer::detail
