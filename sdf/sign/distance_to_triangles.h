@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The distance of a point to the triangles of a mesh, in double precision.
-// Tested by tests/sdf/hole_width.cpp.
+// Tested by tests/sdf/hole_width.cpp through widestHole().
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether a body is wide enough for the voxels of a lattice, wherever the lattice falls.
-// Tested by tests/fluid/seed.cpp through seed() and solid().
 #pragma once
 
 #include <glm/vec3.hpp>
