@@ -2,11 +2,9 @@
 #include <bilayer/sdf/vdb_io.h>
 
 #include <fmt/format.h>
-#include <openvdb/io/Stream.h>
 
 #include <algorithm>
 #include <fstream>
-#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -14,72 +12,18 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/openvdb.h"
-#include "sdf/base/quoted_text.h"
 #include "sdf/grid/distance_check.h"
+#include "sdf/grid/vdb_grids.h"
 #include "sdf/io/atomic_file.h"
-#include "sdf/io/input_file.h"
-#include "sdf/io/mapped_file.h"
 #include "sdf/io/vdb_archive.h"
 #include "sdf/io/vdb_checksum.h"
-#include "sdf/io/vdb_lengths.h"
 
 namespace bilayer {
 
 using namespace detail;
 
-namespace {
-
-/// Max error of a voxel's edge in a file, relative: a hundredth of a voxel over a thousand voxels.
-constexpr double maxVoxelRounding = 1e-5;
-
-template <class Grid>
-typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
-    for (const auto& base : grids)
-        if (auto grid = openvdb::gridPtrCast<Grid>(base); grid && accept(*grid)) return grid;
-    return nullptr;
-}
-
-std::ifstream opened(const std::filesystem::path& path) {
-    std::ifstream stream(path, std::ios::binary);
-    stream.exceptions(std::ios::failbit | std::ios::badbit);
-    return stream;
-}
-
-void shift(openvdb::GridBase& grid, const glm::dvec3& by) {
-    if (by == glm::dvec3(0)) return;
-    const openvdb::math::Transform::Ptr shifted = grid.transform().copy();
-    shifted->postTranslate({by.x, by.y, by.z});
-    grid.setTransform(shifted);
-}
-
-/// Far from zero, OpenVDB finds the edge of a voxel as the difference of two rounded positions.
-void requireVoxels(const openvdb::GridBase& grid) {
-    const double away = grid.indexToWorld(openvdb::Vec3d(0)).length() / grid.voxelSize()[0];  // [voxels]
-    const double rounding = 0.5 * std::numeric_limits<double>::epsilon() * away;
-    if (rounding <= maxVoxelRounding) return;
-    throw std::invalid_argument(fmt::format(
-        "grid {} lies {:.3g} voxels from zero, where a file rounds voxels by {:.1g} of their size and {:g} is "
-        "allowed: move the mesh closer to zero, or take larger voxels",
-        quotedWord(grid.getName()), away, rounding, maxVoxelRounding));
-}
-
-/// Returns the origin of the mesh from which a field in a file was built.
-glm::dvec3 originOf(const openvdb::GridPtrVec& grids) {
-    for (const auto& grid : grids)
-        if (const auto entry = grid->getMetadata<openvdb::Vec3DMetadata>(metadata::origin)) {
-            const openvdb::Vec3d& origin = entry->value();
-            return {origin.x(), origin.y(), origin.z()};
-        }
-    return glm::dvec3(0);
-}
-
-}  // namespace
-
 openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const LevelSet& levelSet) {
-    const openvdb::GridBase::Ptr copy = openvdb::ConstPtrCast<openvdb::GridBase>(grid)->copyGrid();
-    shift(*copy, levelSet.origin());
-    requireVoxels(*copy);
-    return copy;
+    return withOrigin(grid, levelSet.origin());
 }
 
 void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
@@ -115,31 +59,9 @@ void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const
 }
 
 LevelSet readVdb(const std::filesystem::path& path) {
-    openvdb::initialize();
-    requireInputFile(path);
-    openvdb::GridPtrVec grids;
+    std::shared_ptr<Grids> grids = readGrids(path);
     try {
-        requireChecksum(MappedFile(path).bytes());
-        std::ifstream stream = opened(path);
-        requireLengths(stream, std::filesystem::file_size(path));
-        stream.seekg(0);
-        // With delayed loading, the values and any damage to them would stay in the file.
-        grids = *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
-    } catch (const std::exception& error) {
-        throw std::runtime_error(
-            fmt::format("{}: is no .vdb file or is damaged ({})", path.string(), oneLine(error.what())));
-    }
-    const glm::dvec3 origin = originOf(grids);
-    for (const auto& grid : grids) shift(*grid, -origin);
-    auto result = std::make_shared<Grids>();
-    result->distance = first<openvdb::FloatGrid>(
-        grids, [](const auto& grid) { return grid.getGridClass() == openvdb::GRID_LEVEL_SET; });
-    if (!result->distance) throw std::runtime_error(fmt::format("{}: holds no level set", path.string()));
-    result->triangle = first<openvdb::Int32Grid>(grids, [](const auto& grid) { return grid.getName() == "triangle"; });
-    for (const auto& grid : grids)
-        if (grid->getName() == contactPoints) result->points = grid;
-    try {
-        const LevelSet levelSet(std::move(result));
+        const LevelSet levelSet(std::move(grids));
         requireValidDistances(levelSet);
         return levelSet;
     } catch (const std::invalid_argument& error) {

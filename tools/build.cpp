@@ -22,6 +22,7 @@
 #include "tools/build.h"
 #include "tools/commands.h"
 #include "tools/output.h"
+#include "tools/tiles/tile_run.h"
 
 namespace bilayer::tools {
 
@@ -213,10 +214,12 @@ void checkBuildOptions(BuildArguments& a) {
 }
 
 void setSizes(BuildArguments& a, const Mesh& mesh) {
-    if (a.resolutionGiven->count()) {
-        a.options.voxelSize = voxelSizeFor(mesh, a.resolution);
-        requireBand(a);
-    }
+    setSizes(a, a.resolutionGiven->count() ? voxelSizeFor(mesh, a.resolution) : a.options.voxelSize);
+}
+
+void setSizes(BuildArguments& a, float voxelSize) {
+    a.options.voxelSize = voxelSize;
+    if (a.resolutionGiven->count()) requireBand(a);
     if (!a.exteriorGiven->count()) a.exteriorWidth = a.interiorWidth = a.halfWidth;
     const float unit = a.isBandInWorldUnits() ? a.options.voxelSize : 1;
     a.options.exteriorWidthVoxels = a.exteriorWidth / unit;
@@ -324,16 +327,23 @@ void run(BuildArguments a) {
 
 }  // namespace
 
-void addBuild(CLI::App& app) {
+void addBuild(CLI::App& app, const Ranks& ranks) {
     auto* command = app.add_subcommand("build", "Build the field of a mesh");
     const auto a = std::make_shared<BuildArguments>();
+    const auto tiles = std::make_shared<TileArguments>();
     command->add_option("mesh", a->mesh, "OBJ, PLY, STL, OFF, glTF, ...")->required();
-    command->add_option("-o,--output", a->output, "the .vdb file")->required();
+    command->add_option("-o,--output", a->output, "the .vdb file, or the folder of tiles")->required();
     addBuildOptions(*command, *a)->require_option(1);
     command->add_flag("--report", a->report,
                       "also inspect the mesh, as the command inspect does, and count walls thinner than a voxel");
+    CLI::Option* tiled = addTileOptions(*command, *tiles);
+    if (ranks.count > 1) tiled->required();
     command->add_flag("--json", a->json, "print one JSON object");
-    command->callback([a] { run(*a); });
+    command->callback([a, tiles, tiled, ranks] {
+        if (!tiled->count()) return run(*a);
+        checkBuildOptions(*a);
+        buildTiles(*a, *tiles, ranks);
+    });
 }
 
 }  // namespace bilayer::tools

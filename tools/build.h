@@ -64,6 +64,8 @@ void checkBuildOptions(BuildArguments& arguments);
 /// Sets what depends on the mesh: the voxel size of a resolution, and the widths in voxels. Throws CLI::ValidationError
 /// for a width out of range, and as voxelSizeFor() does.
 void setSizes(BuildArguments& arguments, const Mesh& mesh);
+/// The same with the voxel size that a resolution gives.
+void setSizes(BuildArguments& arguments, float voxelSize);
 
 /// Builds a field with all that the options request. The arguments then refer to the outcome's report.
 /// Throws as build(), fluid::extend() and withBody() do.

@@ -58,7 +58,11 @@ inline void requireOther(const std::filesystem::path& output, const std::filesys
         throw CLI::ValidationError("--output", "would overwrite " + input.string());
 }
 
-void addBuild(CLI::App& app);
+struct Ranks;
+
+/// @param ranks  the processes that share the tiles of a build in tiles
+void addBuild(CLI::App& app, const Ranks& ranks);
+void addMerge(CLI::App& app);
 void addBatch(CLI::App& app);
 void addInspect(CLI::App& app);
 void addInfo(CLI::App& app);

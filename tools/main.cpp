@@ -1,77 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer`: fields from meshes on the command line. Exit status 0: done; 1: input or machine at fault, one line on
 // stderr; 2: wrong usage.
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <cerrno>
-#include <csignal>
-#include <cstdio>
-#include <new>
-#include <string>
-#include <system_error>
-
-#include "sdf/io/atomic_file.h"
+#include "tools/command_line.h"
 #include "tools/commands.h"
-#include "tools/output.h"
-
-namespace {
-
-enum Status { done = 0, fault = 1, usage = 2 };
-
-// Opens closed standard streams, in modes in which reading and writing fail: else a file that is opened later would
-// take their place, and receive messages.
-void fillStandardStreams() {
-    for (int stream = STDIN_FILENO; stream <= STDERR_FILENO; ++stream)
-        if (::fcntl(stream, F_GETFD) < 0) (void)!::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
-}
-
-void setSignals() {
-    bilayer::detail::removeAtomicFilesOnSignal();
-    // a closed pipe ends the command quietly; a file above the size limit is an ordinary error
-    std::signal(SIGPIPE, SIG_DFL);
-    std::signal(SIGXFSZ, SIG_IGN);
-}
-
-// Errors of devices and files may have several lines; the contract is one line.
-int complain(const std::string& message) {
-    constexpr const char* spaces = " \t\r\n";
-    std::string line;
-    for (std::size_t begin = 0, end = 0; begin < message.size(); begin = message.find_first_not_of(spaces, end)) {
-        end = std::min(message.find('\n', begin), message.size());
-        if (begin > 0) line += "; ";
-        line += message.substr(begin, message.find_last_not_of(spaces, end) + 1 - begin);
-    }
-    std::fprintf(stderr, "bilayer: %s\n", bilayer::tools::printable(line).c_str());
-    return fault;
-}
-
-// Returns whether a word is empty, and reports it: CLI11 2.2 takes it for the name of an option group, and never ends.
-bool hasEmptyWord(int count, char** arguments) {
-    for (int i = 1; i < count; ++i)
-        if (*arguments[i] == '\0') {
-            std::fprintf(stderr, "argument %d is empty; leave it out, or write a value\n", i);
-            return true;
-        }
-    return false;
-}
-
-int flushOutput() {
-    if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return done;
-    return complain("cannot write to standard output: " + std::generic_category().message(errno));
-}
-
-}  // namespace
+#include "tools/tiles/ranks.h"
 
 int main(int count, char** arguments) {
-    fillStandardStreams();
-    setSignals();
-    if (hasEmptyWord(count, arguments)) return usage;
+    bilayer::tools::prepareProcess();
     CLI::App app("Narrow-band signed distance fields from triangle meshes, in OpenVDB files.", "bilayer");
     app.set_version_flag("--version", bilayer::tools::versions());
     app.require_subcommand(1);
-    bilayer::tools::addBuild(app);
+    bilayer::tools::addBuild(app, {});
+    bilayer::tools::addMerge(app);
     bilayer::tools::addBatch(app);
     bilayer::tools::addInspect(app);
     bilayer::tools::addInfo(app);
@@ -80,14 +20,5 @@ int main(int count, char** arguments) {
     bilayer::tools::addExport(app);
     bilayer::tools::addSeed(app);
     bilayer::tools::addDevices(app);
-    try {
-        app.parse(count, arguments);
-        return flushOutput();
-    } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? flushOutput() : usage;
-    } catch (const std::bad_alloc&) {
-        return complain("out of memory");
-    } catch (const std::exception& error) {
-        return complain(error.what());
-    }
+    return bilayer::tools::runCommandLine(app, count, arguments);
 }

@@ -15,7 +15,7 @@
 
 namespace bilayer::detail {
 
-MappedFile::MappedFile(const std::filesystem::path& path) {
+MappedFile::MappedFile(const std::filesystem::path& path, Paging paging) {
     requireInputFile(path);
     const auto fail = [&] {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), std::generic_category().message(errno)));
@@ -27,8 +27,9 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
     int error = ::fstat(file, &status);
     if (error == 0 && status.st_size > 0) {
         size_ = std::size_t(status.st_size);
-        // map all pages at once: one page fault each would cost as much as reading them
-        data = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE | MAP_POPULATE, file, 0);
+        // map all pages at once where they fit: one page fault each would cost as much as reading them
+        const int populate = paging == Paging::atOnce ? MAP_POPULATE : 0;
+        data = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE | populate, file, 0);
         if (data == MAP_FAILED) error = -1;
     }
     const int reason = errno;
@@ -36,6 +37,10 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
     errno = reason;
     if (error != 0) fail();
     data_ = static_cast<const char*>(data);
+}
+
+void MappedFile::release() const {
+    if (size_ > 0) ::madvise(const_cast<char*>(data_), size_, MADV_DONTNEED);
 }
 
 MappedFile::~MappedFile() {

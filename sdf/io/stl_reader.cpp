@@ -17,28 +17,16 @@
 #include "sdf/io/mapped_file.h"
 #include "sdf/io/mesh_readers.h"
 #include "sdf/io/polygons.h"
+#include "sdf/io/stl_records.h"
 #include "sdf/io/text_source.h"
 
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t headerBytes = 80, facetBytes = 50, normalBytes = 12;
-
-std::uint32_t loadCount(std::string_view bytes) {
-    std::uint32_t count = 0;
-    if (bytes.size() >= headerBytes + sizeof count) std::memcpy(&count, bytes.data() + headerBytes, sizeof count);
-    return count;
-}
-
-/// Returns the size of a binary file with this count of facets.
-std::uint64_t binarySize(std::uint64_t facets) {
-    return headerBytes + sizeof(std::uint32_t) + facetBytes * facets;
-}
-
 /// Decides between text and binary. A file is binary if its size matches its count of facets, or if its bytes are not
 /// text. Headers do not help: some binary files begin with "solid".
 bool isText(std::string_view bytes, std::string_view text) {
-    if (bytes.size() >= binarySize(0) && bytes.size() == binarySize(loadCount(bytes))) return false;
+    if (bytes.size() >= stlBinarySize(0) && bytes.size() == stlBinarySize(stlFacetCount(bytes))) return false;
     constexpr std::size_t sample = 1024;
     const std::string_view begin = text.substr(0, sample);
     const auto isOfText = [](char c) { return c != '\0' && (static_cast<unsigned char>(c) >= ' ' || isSpace(c)); };
@@ -56,27 +44,27 @@ void requireFinite(const glm::vec3* corners, std::size_t triangle, const std::fi
 
 PolygonsOf<float> readBinary(std::string_view bytes, const std::filesystem::path& path) {
     static_assert(std::endian::native == std::endian::little, "STL files are little-endian");
-    const std::uint32_t count = loadCount(bytes);
-    if (bytes.size() < binarySize(0))
+    const std::uint32_t count = stlFacetCount(bytes);
+    if (bytes.size() < stlBinarySize(0))
         throw std::runtime_error(
             fmt::format("{}: has {}; a binary STL file has {} bytes at least, and a text one begins with 'solid'",
-                        path.string(), counted(bytes.size(), "byte", "bytes"), binarySize(0)));
-    if (bytes.size() < binarySize(count))
+                        path.string(), counted(bytes.size(), "byte", "bytes"), stlBinarySize(0)));
+    if (bytes.size() < stlBinarySize(count))
         throw std::runtime_error(
             fmt::format("{}: ends early, after {} bytes: of the {} triangles that it announces there are {}",
-                        path.string(), bytes.size(), count, (bytes.size() - binarySize(0)) / facetBytes));
+                        path.string(), bytes.size(), count, (bytes.size() - stlBinarySize(0)) / stlFacetBytes));
     PolygonsOf<float> polygons;
-    if (const std::uint64_t more = bytes.size() - binarySize(count))
+    if (const std::uint64_t more = bytes.size() - stlBinarySize(count))
         polygons.notes.push_back(fmt::format("left out: {} after the last triangle", counted(more, "byte", "bytes")));
     resizeLarge(polygons.points, std::size_t(3) * count);
     resizeLarge(polygons.triangles, count);
     constexpr std::size_t partFacets = 1 << 14;
     inOrder((count + partFacets - 1) / partFacets, [&](std::size_t part) {
-        const char* facets = bytes.data() + binarySize(0) + normalBytes;
+        const char* facets = bytes.data() + stlBinarySize(0) + stlNormalBytes;
         for (std::size_t i = part * partFacets; i < std::min<std::size_t>((part + 1) * partFacets, count); ++i) {
             glm::vec3* corners = &polygons.points[3 * i];
             polygons.triangles[i] = unsigned(3 * i) + glm::uvec3(0, 1, 2);
-            std::memcpy(corners, facets + facetBytes * i, 3 * sizeof(glm::vec3));
+            std::memcpy(corners, facets + stlFacetBytes * i, 3 * sizeof(glm::vec3));
             const glm::vec3 sum = corners[0] + corners[1] + corners[2];
             // infinite if the sum of finite numbers overflows: rare, and then checked one by one
             if (!std::isfinite(sum.x + sum.y + sum.z)) requireFinite(corners, i, path);

@@ -25,7 +25,8 @@ const std::map<std::string, std::set<std::string>> allowed{
     {"integration/bullet", {"collider", "sdf"}},
     {"integration/fluid", {"collider", "sdf"}},
     {"integration/python", {"integration/fluid", "collider", "cl", "sdf"}},
-    {"tools", {"integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
+    {"integration/mpi", {}},
+    {"tools", {"integration/bullet", "integration/fluid", "integration/mpi", "collider", "cl", "sdf"}},
     {"demos", {"integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
     {"bench", {"demos", "integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
 };

@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# tiles_mpi.sh BILAYER BILAYER_MPI FOLDER: the tiles of 1, 2 and 4 ranks have the same bytes as those of one process.
+source "$(dirname "$0")/batch_shared.sh"
+need mpirun cmp awk
+bilayer=$1 ranks=$2 work=$3
+rm -rf "$work" && mkdir -p "$work" && cd "$work"
+make_library meshes 1
+mesh=meshes/b/0.obj
+options=(--resolution 150 --tiles 3x2x2 --sign normals --json)
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+"$bilayer" build "$mesh" -o one "${options[@]}" >one.json
+for count in 1 2 4; do
+  mpirun --oversubscribe -n "$count" "$ranks" build "$mesh" -o "ranks$count" "${options[@]}" >"ranks$count.json"
+  require_same one "ranks$count"
+done
+"$bilayer" merge ranks4 -o ranks4.vdb >/dev/null
+"$bilayer" build "$mesh" -o whole.vdb --resolution 150 --sign normals >/dev/null
+diff <("$bilayer" info --json ranks4.vdb) <("$bilayer" info --json whole.vdb)
+# an error of one rank ends all of them
+if mpirun --oversubscribe -n 2 "$ranks" build "$mesh" -o refused --resolution 150 --tiles 3x2x2 2>refused.txt; then exit 1; fi
+grep -q "tiles have no sign auto" refused.txt

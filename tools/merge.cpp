@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// `bilayer merge`: the tiles of a field become one .vdb file.
+// Tested by tests/tools/tiles.cpp through run().
+#include <fmt/format.h>
+
+#include <memory>
+#include <stdexcept>
+
+#include <bilayer/sdf/vdb_io.h>
+#include "sdf/grid/vdb_grids.h"
+#include "sdf/tiles/tile_merge.h"
+#include "tools/commands.h"
+#include "tools/output.h"
+#include "tools/tiles/tile_folder.h"
+#include "tools/tiles/tile_plan.h"
+
+namespace bilayer::tools {
+
+using namespace bilayer::detail;
+namespace {
+
+struct Arguments {
+    std::filesystem::path folder, output;
+    bool json = false;
+};
+
+void run(const Arguments& a) {
+    requireWritable(a.output);
+    const Stopwatch watch;
+    const TileFolder folder(a.folder);
+    if (!std::filesystem::exists(folder.manifest()))
+        throw std::runtime_error(
+            fmt::format("{}: no such file; `bilayer build --tiles` writes it when all tiles are there",
+                        folder.manifest().string()));
+    const Json manifest = readJson(folder.manifest());
+    TileMerger merger;
+    try {
+        for (const Json& record : manifest.at("tiles")) {
+            if (record.at("file").is_null()) continue;
+            const std::filesystem::path path = folder.root() / record.at("file").get<std::string>();
+            if (!isIntact(folder, record))
+                throw std::runtime_error(fmt::format(
+                    "{}: is missing or damaged: repeat `bilayer build --tiles`, which builds it again", path.string()));
+            merger.add(*readGrids(path));
+        }
+    } catch (const Json::exception& error) {
+        throw std::runtime_error(fmt::format("{}: is no manifest ({})", folder.manifest().string(), error.what()));
+    }
+    const LevelSet field = merger.merged();
+    writeVdb(a.output, field);
+    if (a.json) {
+        Json json{{"output", a.output.string()}, {"activeVoxels", field.activeVoxels()},
+                  {"leaves", field.leaves()},    {"memoryBytes", field.memoryBytes()},
+                  {"seconds", watch.seconds()},  {"peakRssBytes", peakMemory()}};
+        json.update(provenance(field));
+        return print(json);
+    }
+    Table table(a.output.string());
+    addRows(table, field);
+    table.row("merged in", fmt::format("{:.3f} s", watch.seconds()));
+    table.row("peak memory", bytes(peakMemory()));
+    table.print();
+}
+
+}  // namespace
+
+void addMerge(CLI::App& app) {
+    auto* command = app.add_subcommand("merge", "Join the tiles of a field into one file");
+    const auto a = std::make_shared<Arguments>();
+    command->add_option("folder", a->folder, "what build --tiles wrote")->required();
+    command->add_option("-o,--output", a->output, "the .vdb file")->required();
+    command->add_flag("--json", a->json, "print one JSON object");
+    command->callback([a] { run(*a); });
+}
+
+}  // namespace bilayer::tools

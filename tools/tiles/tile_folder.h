@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the tiles of a field are kept: one .vdb file a tile, manifest.json when all are there, and a folder `work`
+// while some are missing.
+//
+// Tested by tests/tools/tiles.cpp through run().
+#pragma once
+
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <string>
+
+#include "tools/output.h"
+
+namespace bilayer::tools {
+
+class TileFolder {
+  public:
+    explicit TileFolder(std::filesystem::path root) : root_(std::move(root)) {}
+
+    std::filesystem::path manifest() const { return root_ / "manifest.json"; }
+    std::filesystem::path field(const glm::ivec3& tile) const { return root_ / (nameOf(tile) + ".vdb"); }
+
+    /// What a build has planned: the mesh, the options and the tiles. It is there when all triangles are sorted.
+    std::filesystem::path plan() const { return work() / "plan.json"; }
+    /// The triangles of a tile.
+    std::filesystem::path triangles(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".triangles"); }
+    /// What is known of a finished tile.
+    std::filesystem::path record(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".json"); }
+
+    /// Creates the folders that do not exist. Throws std::runtime_error that names the folder.
+    void create() const;
+    /// Removes the folder `work`.
+    void clean() const;
+
+    const std::filesystem::path& root() const { return root_; }
+
+  private:
+    std::filesystem::path work() const { return root_ / "work"; }
+    static std::string nameOf(const glm::ivec3& tile);
+
+    std::filesystem::path root_;
+};
+
+/// Writes a file whole or not at all. Throws std::runtime_error that names the file.
+void writeJson(const std::filesystem::path& path, const Json& json);
+
+/// Throws std::runtime_error that names the file if it cannot be read or is no JSON.
+Json readJson(const std::filesystem::path& path);
+
+/// Returns a hash of a file's bytes, of which only some are in memory at once. Throws std::runtime_error that names the
+/// file.
+std::string fileHash(const std::filesystem::path& path);
+
+/// Returns whether the file of a tile is there with the bytes that its record tells. A tile without leaves has no file.
+bool isIntact(const TileFolder& folder, const Json& record);
+
+}  // namespace bilayer::tools

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tools/tiles/tile_run.h"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <regex>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include "sdf/base/physical_memory.h"
+#include "sdf/grid/vdb_grids.h"
+#include "sdf/io/input_file.h"
+#include "sdf/tiles/tile_sort.h"
+#include "tools/tiles/tile_folder.h"
+#include "tools/tiles/tile_plan.h"
+
+namespace bilayer::tools {
+
+using namespace bilayer::detail;
+namespace {
+
+constexpr double mib = 1 << 20;
+
+// Throws for options whose results need the whole field.
+void requireTileOptions(const BuildArguments& a) {
+    const auto refuse = [](bool given, const char* option) {
+        if (given) throw CLI::ValidationError(option, "is not for --tiles");
+    };
+    refuse(a.body, "--body");
+    refuse(a.extend, "--extend");
+    refuse(a.report, "--report");
+    refuse(a.stored.halfFloat, "--half-float");
+    refuse(a.backend != "tbb", "--backend opencl");
+    try {
+        requireLocal(a.options);
+    } catch (const std::invalid_argument& error) {
+        throw CLI::ValidationError("--tiles", error.what());
+    }
+}
+
+glm::ivec3 countsOf(const std::string& text) {
+    static const std::regex pattern("([1-9][0-9]{0,3})x([1-9][0-9]{0,3})x([1-9][0-9]{0,3})");
+    std::smatch match;
+    if (!std::regex_match(text, match, pattern))
+        throw CLI::ValidationError("--tiles", text + ": must be three counts from 1 to 9999, as 4x4x2");
+    return {std::stoi(match[1]), std::stoi(match[2]), std::stoi(match[3])};
+}
+
+/// The work of one rank.
+class TileRun {
+  public:
+    TileRun(BuildArguments arguments, const TileArguments& tiles, const Ranks& ranks)
+        : a_(std::move(arguments)),
+          counts_(countsOf(tiles.counts)),
+          budget_(tiles.memoryGiven->count() ? double(tiles.memory) * mib : physicalMemory()),
+          ranks_(ranks),
+          folder_(a_.output) {}
+
+    void run() {
+        if (ranks_.isFirst()) prepare();
+        ranks_.wait();
+        if (!std::filesystem::exists(folder_.manifest())) buildMissing();
+        if (!ranks_.isFirst()) return;
+        const Json manifest = readJson(folder_.manifest());
+        a_.json ? print(manifest) : printTable(manifest);
+    }
+
+  private:
+    // Plans the field, or goes on with what is planned. Afterwards there is the manifest of a finished field, or a plan
+    // and the records of exactly those tiles that are intact.
+    void prepare() {
+        const Json identity = identityOf(a_, counts_, fileHash(a_.mesh));
+        for (const auto& path : {folder_.manifest(), folder_.plan()})
+            if (std::filesystem::exists(path) && readJson(path).at("field") != identity)
+                throw std::runtime_error(
+                    fmt::format("{}: holds tiles of another mesh or with other options: choose another folder",
+                                a_.output.string()));
+        if (isFinished()) return;
+        if (!std::filesystem::exists(folder_.plan())) sort(identity);
+        const TilePlan plan(readJson(folder_.plan()));
+        setSizes(a_, plan.voxelSize());
+        Tiling tiling(plan.facts().box, a_.options, counts_);
+        for (std::size_t tile = 0; tile < tiling.size(); ++tile) {
+            const std::filesystem::path record = folder_.record(tiling.place(tile));
+            if (std::filesystem::exists(record) && !isIntact(folder_, readJson(record)))
+                std::filesystem::remove(record);
+        }
+        stateMemory(plan, tiling);
+    }
+
+    // Returns whether all tiles are intact. If not, the manifest becomes the records of those that are.
+    bool isFinished() const {
+        if (!std::filesystem::exists(folder_.manifest())) return false;
+        const Json records = readJson(folder_.manifest()).at("tiles");
+        const auto intact = [&](const Json& record) { return isIntact(folder_, record); };
+        if (std::all_of(records.begin(), records.end(), intact)) return true;
+        folder_.create();
+        for (const Json& record : records)
+            if (intact(record)) writeJson(folder_.record(placeOf(record)), record);
+        std::filesystem::remove(folder_.manifest());
+        return false;
+    }
+
+    void buildMissing() {
+        const TilePlan plan(readJson(folder_.plan()));
+        setSizes(a_, plan.voxelSize());
+        Tiling tiling(plan.facts().box, a_.options, counts_);
+        for (const std::size_t tile : ownTiles(plan, tiling)) build(plan, tiling, tile);
+        ranks_.wait();
+        if (ranks_.isFirst()) finish(plan, tiling);
+    }
+
+    void sort(const Json& identity) {
+        const Stopwatch watch;
+        folder_.create();
+        const std::unique_ptr<TriangleSource> source = openMesh();
+        const MeshFacts& facts = source->facts();
+        const float side = facts.box.longestSide();
+        setSizes(a_, a_.resolutionGiven->count() ? side / a_.resolution : a_.options.voxelSize);
+        Tiling tiling(facts.box, a_.options, counts_);
+        const auto fileOf = [&](std::size_t tile) { return folder_.triangles(tiling.place(tile)); };
+        const std::vector<TileLoad> loads = sortTriangles(*source, tiling, a_.options.voxelSize, fileOf);
+        const Json sorting{{"seconds", watch.seconds()}, {"peakRssBytes", peakMemory()}, {"streamed", facts.hash == 0}};
+        writeJson(folder_.plan(), TilePlan::toJson(identity, facts, a_.options.voxelSize, loads, sorting));
+    }
+
+    // Reads the mesh whole if it fits, since its hash is then known.
+    std::unique_ptr<TriangleSource> openMesh() const {
+        requireInputFile(a_.mesh);
+        const double whole = double(std::filesystem::file_size(a_.mesh)) * bytesPerFileByte + bytesOfReader;
+        if (whole <= budget_) return trianglesOf(readMesh(a_.mesh));
+        if (auto source = trianglesOfFile(a_.mesh)) return source;
+        throw std::runtime_error(fmt::format(
+            "{}: reading it whole needs about {:.0f} MiB, and {:.0f} MiB are given; a binary STL file, or a binary PLY "
+            "file of triangles with float coordinates, is not read whole",
+            a_.mesh.string(), whole / mib, budget_ / mib));
+    }
+
+    double need(const TilePlan& plan, const Tiling& tiling, std::size_t tile) const {
+        const TileLoad& load = plan.loads()[tile];
+        return tileBytes(load.triangles, load.area, tiling, tile, a_.options);
+    }
+
+    // Refuses, before any tile is built, what would not fit.
+    void stateMemory(const TilePlan& plan, const Tiling& tiling) const {
+        double largest = 0;
+        for (std::size_t tile = 0; tile < tiling.size(); ++tile) largest = std::max(largest, need(plan, tiling, tile));
+        if (largest > budget_)
+            throw std::runtime_error(
+                fmt::format("the largest of {} tiles needs about {:.0f} MiB, and {:.0f} MiB are given: take more tiles",
+                            tiling.size(), largest / mib, budget_ / mib));
+        if (a_.json) return;
+        fmt::print("each of {} tiles within {:.0f} MiB\n", tiling.size(), largest / mib);
+        std::fflush(stdout);
+    }
+
+    // The missing tiles, the largest first, dealt to all ranks in turn.
+    std::vector<std::size_t> ownTiles(const TilePlan& plan, const Tiling& tiling) const {
+        std::vector<std::size_t> missing, own;
+        for (std::size_t tile = 0; tile < tiling.size(); ++tile)
+            if (!std::filesystem::exists(folder_.record(tiling.place(tile)))) missing.push_back(tile);
+        std::stable_sort(missing.begin(), missing.end(),
+                         [&](std::size_t a, std::size_t b) { return need(plan, tiling, a) > need(plan, tiling, b); });
+        ranks_.wait();  // else a record of a fast rank would be missed here
+        for (std::size_t i = std::size_t(ranks_.rank); i < missing.size(); i += std::size_t(ranks_.count))
+            own.push_back(missing[i]);
+        return own;
+    }
+
+    void build(const TilePlan& plan, const Tiling& tiling, std::size_t tile) {
+        const Stopwatch watch;
+        const glm::ivec3 place = tiling.place(tile);
+        const std::uint64_t count = plan.loads()[tile].triangles;
+        BuiltTile built;
+        {
+            const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), count);
+            built = wrapped([&] { return buildTile(triangles, plan.facts(), tiling, tile, a_.options); });
+        }
+        Json record = recordOf(place, tiling.own(tile).within(tiling.lattice()), count, built);
+        if (built.grids) {
+            const std::filesystem::path path = folder_.field(place);
+            openvdb::GridCPtrVec grids{withOrigin(built.grids->distance, plan.facts().origin)};
+            if (built.grids->triangle) grids.push_back(withOrigin(built.grids->triangle, plan.facts().origin));
+            writeGrids(path, grids);
+            record["file"] = path.filename().string();
+            record["hash"] = fileHash(path);
+        }
+        built = {};
+        ::malloc_trim(0);  // what one tile has used is free for the next
+        record["rank"] = ranks_.rank;
+        record["seconds"] = watch.seconds();
+        record["peakRssBytes"] = peakMemory();
+        writeJson(folder_.record(place), record);
+    }
+
+    template <class Work>
+    BuiltTile wrapped(const Work& work) const {
+        try {
+            return work();
+        } catch (const std::invalid_argument& error) {
+            throw std::invalid_argument(fmt::format("{}: {}", a_.mesh.string(), error.what()));
+        }
+    }
+
+    void finish(const TilePlan& plan, const Tiling& tiling) {
+        std::vector<Json> records;
+        for (std::size_t tile = 0; tile < tiling.size(); ++tile)
+            records.push_back(readJson(folder_.record(tiling.place(tile))));
+        if (std::all_of(records.begin(), records.end(), [](const Json& r) { return r.at("file").is_null(); }))
+            throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
+        joinSides(records, counts_);
+        writeJson(folder_.manifest(), plan.manifest(records, ranks_.count));
+        folder_.clean();
+    }
+
+    void printTable(const Json& manifest) const {
+        Table table(a_.output.string());
+        const Json& sum = manifest.at("sum");
+        table.row("tiles", fmt::format("{} x {} x {}, {} of them with leaves", counts_.x, counts_.y, counts_.z,
+                                       sum.at("files").get<std::size_t>()));
+        table.row("leaves", grouped(sum.at("leaves")));
+        table.row("triangles", grouped(manifest.at("mesh").at("triangles")));
+        table.row("sorted in",
+                  fmt::format("{:.3f} s, peak memory {}", manifest.at("sorting").at("seconds").get<double>(),
+                              bytes(manifest.at("sorting").at("peakRssBytes"))));
+        table.row("built in", fmt::format("{:.3f} s of all tiles", sum.at("seconds").get<double>()));
+        table.row("peak memory", bytes(sum.at("peakRssBytes")));
+        table.print();
+    }
+
+    /// Memory to read a mesh whole, per byte of its file, and the program without it [bytes]. The largest factor is
+    /// that of binary files.
+    static constexpr double bytesPerFileByte = 6, bytesOfReader = 120e6;
+
+    BuildArguments a_;
+    glm::ivec3 counts_;
+    double budget_;  // [bytes]
+    const Ranks& ranks_;
+    TileFolder folder_;
+};
+
+}  // namespace
+
+CLI::Option* addTileOptions(CLI::App& command, TileArguments& a) {
+    auto* tiles = command.add_option("--tiles", a.counts,
+                                     "build in tiles, as 4x4x2: -o is then a folder of one .vdb file a tile");
+    a.memoryGiven = command
+                        .add_option("--memory", a.memory,
+                                    "memory that a build in tiles may use [MiB], default all of the machine's")
+                        ->check(CLI::Range(std::uint64_t(1), std::uint64_t(1) << 30))
+                        ->needs(tiles);
+    return tiles;
+}
+
+void buildTiles(BuildArguments a, const TileArguments& tiles, const Ranks& ranks) {
+    requireTileOptions(a);
+    const std::string folder = a.output.string();
+    try {
+        TileRun(std::move(a), tiles, ranks).run();
+    } catch (const Json::exception& error) {
+        throw std::runtime_error(
+            fmt::format("{}: a file of the tiles is damaged ({}): remove the folder", folder, error.what()));
+    }
+}
+
+}  // namespace bilayer::tools
