@@ -128,8 +128,9 @@ Shape broadcast(std::initializer_list<Floats*> arguments) {
             const auto axis = [&](const Shape& of) { return i < of.size() ? of[of.size() - 1 - i] : 1; };
             const py::ssize_t a = axis(common), b = axis(shape);
             if (a != b && a != 1 && b != 1)
-                throw std::invalid_argument(fmt::format("{}: leading shape {} does not fit {} of leading shape {}", argument->name(),
-                                                        text(shape, false), longest->name(), text(common, false)));
+                throw std::invalid_argument(fmt::format("{}: leading shape {} does not fit {} of leading shape {}",
+                                                        argument->name(), text(shape, false), longest->name(),
+                                                        text(common, false)));
             both[both.size() - 1 - i] = a == 1 ? b : a;
         }
         if (!longest || both != common) longest = argument;

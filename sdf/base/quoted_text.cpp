@@ -10,7 +10,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t maxQuoted = 40;     // characters
+constexpr std::size_t maxQuoted = 40;       // characters
 constexpr std::size_t maxLineLength = 300;  // [bytes]: libraries quote the contents of the file
 
 }  // namespace
@@ -27,7 +27,8 @@ std::string oneLine(std::string text) {
         if (std::iscntrl(static_cast<unsigned char>(c)) || static_cast<unsigned char>(c) >= 0x80) c = ' ';
     const std::size_t end = text.find_last_not_of(' ');
     text.erase(end == std::string::npos ? 0 : end + 1);
-    if (text.size() > maxLineLength) text = text.substr(0, std::min(text.rfind(' ', maxLineLength), maxLineLength)) + " ...";
+    if (text.size() > maxLineLength)
+        text = text.substr(0, std::min(text.rfind(' ', maxLineLength), maxLineLength)) + " ...";
     return text;
 }
 

@@ -76,8 +76,8 @@ struct MeshJob {
     Progress& progress;
     /// Returns whether any block in a cube of voxels with this first voxel and side is needed; null: all are.
     std::function<bool(const glm::ivec3& first, int side)> wanted{};
-    /// Counts voxels that nearby triangles leave undecided, so that the whole mesh was queried, or that are equally near
-    /// to both layers; or null.
+    /// Counts voxels that nearby triangles leave undecided, so that the whole mesh was queried, or that are equally
+    /// near to both layers; or null.
     std::atomic<std::size_t>* undecided = nullptr;
     /// Counts voxels that the normals place on both sides of the surface; or null.
     std::atomic<std::size_t>* conflicts = nullptr;

@@ -124,7 +124,8 @@ TEST_CASE("a mesh that is not read whole gives the same leaves") {
         CHECK(manifest["mesh"]["hash"].is_null());
         CHECK(manifest["mesh"]["triangles"] == sphere.triangles.size());
         CHECK(manifest["sum"]["peakRssBytes"].get<double>() < 250.0 * (1 << 20));
-        const LevelSet whole = readVdb(fieldInOnePiece(mesh, "whole.vdb", {"--resolution", "160", "--sign", "normals"}));
+        const LevelSet whole =
+            readVdb(fieldInOnePiece(mesh, "whole.vdb", {"--resolution", "160", "--sign", "normals"}));
         CHECK(sameTrees(*merged(folder).grids().distance, *whole.grids().distance));
         fs::remove(mesh);
     }
