@@ -102,7 +102,7 @@ TEST_CASE("the certificate holds for random triangles of all sizes") {
     }
 }
 
-// The large piece must lie in the cylinder of its cluster. Near 1, a cosine in single precision is too coarse to give
+// The large piece must lie in the cylinder of its cluster. Near 1, a cosine in floats is too coarse to give
 // the sine of a small angle.
 TEST_CASE("the certificate holds for a large piece that is nearly parallel to small ones") {
     const unsigned seed = test::seed();
