@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
+#include <stdexcept>
 
 #include "sdf/base/method_names.h"
 #include "sdf/io/atomic_file.h"
@@ -306,6 +308,15 @@ void ProgressBar::draw(float part) {
 
 void requireWritable(const std::filesystem::path& path) {
     const AtomicFile probe(path);
+}
+
+void writeText(const std::filesystem::path& path, const std::string& text) {
+    AtomicFile file(path);
+    std::ofstream stream(file.temporary(), std::ios::binary);
+    stream << text;
+    stream.close();
+    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
+    file.commit();
 }
 
 std::uint64_t peakMemory() {

@@ -115,6 +115,9 @@ class ProgressBar {
 /// time.
 void requireWritable(const std::filesystem::path& path);
 
+/// Writes a file whole or not at all. Throws std::runtime_error that names the file.
+void writeText(const std::filesystem::path& path, const std::string& text);
+
 /// Returns the peak memory of the process [bytes].
 std::uint64_t peakMemory();
 

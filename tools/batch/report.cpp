@@ -3,10 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <stdexcept>
-
-#include "sdf/io/atomic_file.h"
 #include "tools/batch/records.h"
 #include "tools/batch/report_page.h"
 #include "tools/batch/summary.h"
@@ -66,21 +62,12 @@ Json toJson(const BatchSummary& summary, std::size_t damagedLines) {
             {"damagedLines", damagedLines}};
 }
 
-void writePage(const std::filesystem::path& path, const std::string& page) {
-    detail::AtomicFile file(path);
-    std::ofstream stream(file.temporary(), std::ios::binary);
-    stream << page;
-    stream.close();
-    if (!stream) throw std::runtime_error(path.string() + ": cannot be written (is the disk full?)");
-    file.commit();
-}
-
 }  // namespace
 
 void reportBatch(const BatchFolder& folder, bool json) {
     const RecordList list = readRecords(folder.records());
     const BatchSummary summary = summaryOf(list.records);
-    writePage(folder.root() / "report.html", reportPage(folder, list.records, summary));
+    writeText(folder.root() / "report.html", reportPage(folder, list.records, summary));
     if (json) return print(toJson(summary, list.damagedLines));
     printText(folder.root(), summary, list.damagedLines);
 }

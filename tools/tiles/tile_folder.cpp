@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "sdf/io/atomic_file.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/mapped_file.h"
 #include "tools/batch/content_hash.h"
@@ -33,12 +32,7 @@ void TileFolder::clean() const {
 }
 
 void writeJson(const std::filesystem::path& path, const Json& json) {
-    AtomicFile file(path);
-    std::ofstream stream(file.temporary(), std::ios::binary);
-    stream << json.dump(1) << "\n";
-    stream.close();
-    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-    file.commit();
+    writeText(path, json.dump(1) + "\n");
 }
 
 Json readJson(const std::filesystem::path& path) {
