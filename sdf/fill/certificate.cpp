@@ -10,9 +10,11 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <stdexcept>
 
 #include "sdf/base/exact_error.h"
+#include "sdf/sign/closest_side.h"
 
 namespace bilayer::detail {
 namespace {
@@ -22,25 +24,6 @@ constexpr double pieceRounding = 1e-5;
 /// The voxels of a block are checked in cubes of this side, each against the triangles that may be near it [voxels].
 constexpr int partSide = 4;
 constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-
-double distanceToSegment(const glm::dvec3& point, const glm::dvec3& a, const glm::dvec3& b) {
-    const glm::dvec3 along = b - a;
-    const double length2 = glm::dot(along, along);
-    const double t = length2 > 0 ? std::clamp(glm::dot(point - a, along) / length2, 0.0, 1.0) : 0.0;
-    return glm::distance(point, a + t * along);
-}
-
-/// The minimum of the distances to the three edges, and to the plane where the point projects into the triangle.
-double distanceTo(const TriangleCorners& c, const glm::dvec3& point) {
-    const double edges = std::min({distanceToSegment(point, c[0], c[1]), distanceToSegment(point, c[1], c[2]),
-                                   distanceToSegment(point, c[2], c[0])});
-    const glm::dvec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
-    const double area2 = glm::dot(normal, normal);
-    if (!(area2 > 0)) return edges;
-    for (std::size_t k = 0; k < 3; ++k)
-        if (glm::dot(glm::cross(c[(k + 1) % 3] - c[k], point - c[k]), normal) < 0) return edges;
-    return std::min(edges, std::abs(glm::dot(point - c[0], normal)) / std::sqrt(area2));
-}
 
 /// Whether a triangle comes within reach of a voxel of a box; cells that are certainly farther are skipped.
 bool reaches(const TriangleCorners& corners, const glm::ivec3& first, const glm::ivec3& size, double reach) {
@@ -56,12 +39,6 @@ bool reaches(const TriangleCorners& corners, const glm::ivec3& first, const glm:
         if (std::min({of.x, of.y, of.z}) > 0 && reaches(corners, at, of, reach)) return true;
     }
     return false;
-}
-
-TriangleCorners cornersOf(const Mesh& mesh, std::uint32_t triangle, double voxelsPerUnit) {
-    const glm::uvec3& t = mesh.triangles[triangle];
-    const auto corner = [&](unsigned k) { return glm::dvec3(mesh.points[k]) * voxelsPerUnit; };
-    return {corner(t.x), corner(t.y), corner(t.z)};
 }
 
 TriangleCorners cornersOf(const Piece& piece) {
@@ -86,8 +63,9 @@ void requireCompleteBins(const Mesh& mesh, const TriangleBins& bins, double voxe
         const glm::ivec3& origin = bins.origins[brick];
         bricks[{origin.x, origin.y, origin.z}] = brick;
     }
-    for (std::uint32_t triangle = 0; triangle < mesh.triangles.size(); ++triangle) {
-        const TriangleCorners c = cornersOf(mesh, triangle, voxelsPerUnit);
+    std::vector<std::uint32_t> all(mesh.triangles.size());
+    std::iota(all.begin(), all.end(), 0u);
+    forEachTriangle(mesh, all, voxelsPerUnit, [&](std::uint32_t triangle, const TriangleCorners& c) {
         const auto brickOf = [&](const glm::dvec3& point) { return glm::ivec3(glm::floor(point / double(bins.side))); };
         const glm::ivec3 lower = brickOf(glm::min(c[0], glm::min(c[1], c[2])) - double(reach));
         const glm::ivec3 upper = brickOf(glm::max(c[0], glm::max(c[1], c[2])) + double(reach));
@@ -104,7 +82,7 @@ void requireCompleteBins(const Mesh& mesh, const TriangleBins& bins, double voxe
                         fail(fmt::format("triangle {} is not in the brick at {}, whose voxels it reaches", triangle,
                                          text(origin)));
                 }
-    }
+    });
 }
 
 void requireCovered(std::span<const Piece> pieces, std::span<const Cluster> clusters,
@@ -130,13 +108,12 @@ void requireCovered(std::span<const Piece> pieces, std::span<const Cluster> clus
 
 BlockCheck::BlockCheck(const Mesh& mesh, std::span<const std::uint32_t> triangles, double voxelsPerUnit) {
     balls_.reserve(triangles.size());
-    for (const std::uint32_t triangle : triangles) {
-        const TriangleCorners c = cornersOf(mesh, triangle, voxelsPerUnit);
+    forEachTriangle(mesh, triangles, voxelsPerUnit, [&](std::uint32_t triangle, const TriangleCorners& c) {
         const glm::dvec3 centre = (c[0] + c[1] + c[2]) / 3.0;
         const double radius =
             std::max({glm::distance(c[0], centre), glm::distance(c[1], centre), glm::distance(c[2], centre)});
         balls_.push_back({c, centre, radius, triangle});
-    }
+    });
 }
 
 void BlockCheck::require(const glm::ivec3& origin, std::span<const Piece> pieces, const BlockDistances& block,

@@ -28,14 +28,15 @@ namespace {
 /// Maximum edge length of a piece [voxels]. Longer edges are halved, so that a piece stays near the blocks that query
 /// it and floats resolve its frame.
 constexpr double longestPieceEdge = 16;
+/// Maximum count of paths that are tried before the winding number of the whole mesh.
+constexpr int maxPaths = 16;
+
+/// Whether the certificate is checked.
 #ifdef BILAYER_VERIFY
 constexpr bool verifying = true;
 #else
 constexpr bool verifying = false;
 #endif
-
-/// Maximum count of paths that are tried before the winding number of the whole mesh.
-constexpr int maxPaths = 16;
 
 // Working memory of a thread, reused for each brick.
 struct ExactBrickScratch {

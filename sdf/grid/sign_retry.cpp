@@ -25,7 +25,7 @@ bool isKnownToIntersectItself(const BuildOptions& options) {
 //   stay. If it is closed but for small holes, it is a solid whose every face exists twice, and orient() flips one
 //   half.
 // - If the two copies have different diagonals, they share no triangle, but winding numbers find no volume between
-// them.
+//   them.
 std::optional<SignChoice> otherChoice(const FieldSigns& signs, const Mesh& mesh, Progress& progress) {
     if (signs.conflicts > 0) return chooseSignAfterConflict(mesh, &progress);
     if (signs.undecided == 0) return std::nullopt;

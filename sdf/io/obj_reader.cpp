@@ -236,9 +236,7 @@ Mesh readObj(const std::filesystem::path& path, ReadReport& report) {
     const TextSource source(path, file.bytes());
     std::vector<ObjPart> parts = cut(source);
     inOrder(parts.size(), [&](std::size_t i) { PartReader(source, parts[i]).run(); });
-    Polygons polygons = joined(source, parts);
-    file.unmap();
-    return assembled(std::move(polygons), path, report);
+    return assembled(file, joined(source, parts), path, report);
 }
 
 }  // namespace bilayer::detail

@@ -256,9 +256,7 @@ Mesh readOff(const std::filesystem::path& path, ReadReport& report) {
     const TextSource source(path, file.bytes());
     const OffHeader header = readHeader(source);
     requireRoom(source, header);
-    Polygons polygons = readAnyLayout(source, header);
-    file.unmap();
-    return assembled(std::move(polygons), path, report);
+    return assembled(file, readAnyLayout(source, header), path, report);
 }
 
 }  // namespace bilayer::detail

@@ -114,17 +114,13 @@ Polygons readText(const PlyHeader& header, const TextSource& source) {
 
 Mesh readPly(const std::filesystem::path& path, ReadReport& report) {
     MappedFile file(path);
-    const auto assembledOf = [&](auto polygons) {
-        file.unmap();
-        return assembled(std::move(polygons), path, report);
-    };
     const TextSource source(path, file.bytes());
     const PlyHeader header = readPlyHeader(path, source);
-    if (header.format == PlyFormat::text) return assembledOf(readText(header, source));
+    if (header.format == PlyFormat::text) return assembled(file, readText(header, source), path, report);
     const bool isBig = std::endian::native == std::endian::big;
     const PlyData data{header.end, source.end(), (header.format == PlyFormat::binaryBig) != isBig};
-    if (header.storesFloats()) return assembledOf(PlyReader<float>(header).readBinary(data));
-    return assembledOf(PlyReader<double>(header).readBinary(data));
+    if (header.storesFloats()) return assembled(file, PlyReader<float>(header).readBinary(data), path, report);
+    return assembled(file, PlyReader<double>(header).readBinary(data), path, report);
 }
 
 }  // namespace bilayer::detail

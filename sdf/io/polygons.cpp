@@ -20,6 +20,7 @@
 #include "sdf/base/large_array.h"
 #include "sdf/base/parallel_parts.h"
 #include "sdf/base/welding.h"
+#include "sdf/io/mapped_file.h"
 #include "sdf/io/text_source.h"
 #include "sdf/io/triangulate.h"
 
@@ -285,9 +286,17 @@ Mesh assembled(PolygonsOf<Scalar> polygons, const std::filesystem::path& path, R
     }
 }
 
+template <class Scalar>
+Mesh assembled(MappedFile& file, PolygonsOf<Scalar> polygons, const std::filesystem::path& path, ReadReport& report) {
+    file.unmap();
+    return assembled(std::move(polygons), path, report);
+}
+
 template void setFaces(PolygonsOf<float>&, std::vector<Faces>);
 template void setFaces(PolygonsOf<double>&, std::vector<Faces>);
 template Mesh assembled(PolygonsOf<float>, const std::filesystem::path&, ReadReport&);
 template Mesh assembled(PolygonsOf<double>, const std::filesystem::path&, ReadReport&);
+template Mesh assembled(MappedFile&, PolygonsOf<float>, const std::filesystem::path&, ReadReport&);
+template Mesh assembled(MappedFile&, PolygonsOf<double>, const std::filesystem::path&, ReadReport&);
 
 }  // namespace bilayer::detail

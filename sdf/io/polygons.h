@@ -21,6 +21,8 @@ struct ReadReport;
 
 namespace bilayer::detail {
 
+class MappedFile;
+
 /// @tparam Scalar  float if the file has single precision only
 template <class Scalar>
 struct PolygonsOf {
@@ -99,5 +101,9 @@ bool isTooFarForFloats(double farthest, double size);
 /// not exist. Throws std::invalid_argument if a coordinate that a face uses is not finite.
 template <class Scalar>
 Mesh assembled(PolygonsOf<Scalar> polygons, const std::filesystem::path& path, ReadReport& report);
+
+/// The same for the contents of a mapped file, which is unmapped first: the mesh then takes its memory.
+template <class Scalar>
+Mesh assembled(MappedFile& file, PolygonsOf<Scalar> polygons, const std::filesystem::path& path, ReadReport& report);
 
 }  // namespace bilayer::detail

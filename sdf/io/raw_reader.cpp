@@ -94,9 +94,7 @@ class RawReader {
 Mesh readRaw(const std::filesystem::path& path, ReadReport& report) {
     MappedFile file(path);
     const TextSource source(path, file.bytes());
-    Polygons polygons = RawReader(source).run();
-    file.unmap();
-    return assembled(std::move(polygons), path, report);
+    return assembled(file, RawReader(source).run(), path, report);
 }
 
 }  // namespace bilayer::detail

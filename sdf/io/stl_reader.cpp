@@ -182,13 +182,9 @@ Polygons readText(const TextSource& source) {
 
 Mesh readStl(const std::filesystem::path& path, ReadReport& report) {
     MappedFile file(path);
-    const auto assembledOf = [&](auto polygons) {
-        file.unmap();
-        return assembled(std::move(polygons), path, report);
-    };
     const TextSource source(path, file.bytes());
-    return isText(file.bytes(), source.text()) ? assembledOf(readText(source))
-                                               : assembledOf(readBinary(file.bytes(), path));
+    if (isText(file.bytes(), source.text())) return assembled(file, readText(source), path, report);
+    return assembled(file, readBinary(file.bytes(), path), path, report);
 }
 
 }  // namespace bilayer::detail

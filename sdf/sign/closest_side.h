@@ -66,4 +66,9 @@ std::optional<int> segmentCrossing(const TriangleCorners& corners, const glm::dv
 /// Returns the point of a triangle that is closest to the origin. Also valid for triangles without area.
 glm::dvec3 closestToOrigin(const TriangleCorners& corners);
 
+/// Returns the distance of a point to a triangle. Also valid for triangles without area.
+inline double distanceTo(const TriangleCorners& corners, const glm::dvec3& point) {
+    return glm::length(closestToOrigin({corners[0] - point, corners[1] - point, corners[2] - point}));
+}
+
 }  // namespace bilayer::detail

@@ -25,9 +25,9 @@ inline double distanceToTriangles(const Mesh& mesh, const TriangleTree& tree, co
         },
         [&](unsigned triangle) {
             const glm::uvec3& t = mesh.triangles[triangle];
-            const TriangleCorners corners{glm::dvec3(mesh.points[t.x]) - point, glm::dvec3(mesh.points[t.y]) - point,
-                                          glm::dvec3(mesh.points[t.z]) - point};
-            bound = std::min(bound, glm::length(closestToOrigin(corners)));
+            const TriangleCorners corners{glm::dvec3(mesh.points[t.x]), glm::dvec3(mesh.points[t.y]),
+                                          glm::dvec3(mesh.points[t.z])};
+            bound = std::min(bound, distanceTo(corners, point));
         });
     return bound;
 }

@@ -31,9 +31,8 @@ struct Passes {
 bool FallbackSign::isInside(const glm::dvec3& point) {
     if (isPart_)
         throw std::invalid_argument(
-            "the normals nearest to a voxel cancel out, and only the whole mesh can decide its side: build this field "
-            "in "
-            "one piece");
+            "the normals nearest to a voxel cancel out, and only the whole mesh can decide its side: "
+            "build this field in one piece");
     if (asked_) ++*asked_;
     // Isolated: a waiting thread must not take a task that would wait for the same flag.
     std::call_once(looked_, [&] {
