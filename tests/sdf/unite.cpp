@@ -125,6 +125,26 @@ double toBalls(const glm::dvec3& p, const glm::dvec3& c1, double r1, const glm::
     return -smallest;
 }
 
+// Pairs of boxes at any angle that mostly overlap.
+class RotatedPairs {
+  public:
+    RotatedPairs(std::mt19937& random, double minSize) : random_(random), size_(minSize, 0.7) {}
+
+    std::array<RotatedBox, 2> operator()() {
+        std::array<RotatedBox, 2> boxes;
+        for (RotatedBox& box : boxes)
+            box = {{place_(random_), place_(random_), place_(random_)},
+                   {size_(random_), size_(random_), size_(random_)},
+                   glm::normalize(glm::dquat(normal_(random_), normal_(random_), normal_(random_), normal_(random_)))};
+        return boxes;
+    }
+
+  private:
+    std::mt19937& random_;
+    std::uniform_real_distribution<double> size_, place_{-0.3, 0.3};
+    std::normal_distribution<double> normal_;
+};
+
 }  // namespace
 
 TEST_CASE("a mesh without buried walls keeps its bytes") {
@@ -166,15 +186,10 @@ TEST_CASE("the union of two boxes at any angle has their outer surface") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     std::mt19937 random(seed);
-    std::normal_distribution<double> normal;
-    std::uniform_real_distribution<double> size(0.2, 0.7), place(-0.3, 0.3);
+    RotatedPairs randomPair(random, 0.2);
     for (int i = 0; i < 200; ++i) {
         CAPTURE(i);
-        std::array<RotatedBox, 2> boxes;
-        for (RotatedBox& box : boxes)
-            box = {{place(random), place(random), place(random)},
-                   {size(random), size(random), size(random)},
-                   glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)))};
+        const std::array<RotatedBox, 2> boxes = randomPair();
         const test::Truth united(unite(shapes::join({boxes[0].mesh(), boxes[1].mesh()})).mesh);
         for (const glm::dvec3& p : randomPoints(random, 100))
             REQUIRE(united.distance(p) ==
@@ -186,15 +201,10 @@ TEST_CASE("the boundary of a union encloses its volume: boxes at any angle") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     std::mt19937 random(seed);
-    std::normal_distribution<double> normal;
-    std::uniform_real_distribution<double> size(0.05, 0.7), place(-0.3, 0.3);
+    RotatedPairs randomPair(random, 0.05);
     for (int i = 0; i < 300; ++i) {
         CAPTURE(i);
-        std::array<RotatedBox, 2> boxes;
-        for (RotatedBox& box : boxes)
-            box = {{place(random), place(random), place(random)},
-                   {size(random), size(random), size(random)},
-                   glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)))};
+        const std::array<RotatedBox, 2> boxes = randomPair();
         const double volume = unionVolume(boxes[0], boxes[1]);
         CHECK(volumeWithin(unionBoundary(shapes::join({boxes[0].mesh(), boxes[1].mesh()}))) ==
               Approx(volume).margin(1e-6));
