@@ -20,6 +20,7 @@
 
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::python {
 namespace {

@@ -19,6 +19,7 @@
 #include "integration/python/cancellable.h"
 #include "integration/python/grid_bytes.h"
 #include "integration/python/objects.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::python {
 namespace {

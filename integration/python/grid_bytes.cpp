@@ -7,6 +7,8 @@
 #include <sstream>
 #include <string>
 
+#include "sdf/base/openvdb.h"
+
 namespace bilayer::python {
 
 py::bytes bytesOf(const openvdb::GridCPtrVec& grids) {

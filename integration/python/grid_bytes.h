@@ -2,8 +2,9 @@
 // OpenVDB grids as bytes, for pickles.
 #pragma once
 
-#include <openvdb/openvdb.h>
 #include <pybind11/pybind11.h>
+
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::python {
 

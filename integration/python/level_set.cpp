@@ -21,6 +21,7 @@
 #include "integration/python/bindings.h"
 #include "integration/python/dense.h"
 #include "integration/python/grid_bytes.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::python {
 namespace {
