@@ -6,10 +6,12 @@
 #include <cmath>
 #include <utility>
 
+#include "sdf/sign/winding_steep_leaf.h"
+
 namespace bilayer::detail {
 namespace {
 
-/// Where the winding number may change by more than this per voxel, it is evaluated in smaller regions.
+/// Where the winding number may change by more than this per voxel, each voxel is asked for its own slope.
 constexpr double calmSlope = 0.02;
 /// Reserved part of the distance to one half, for voxels near the surface: two links of at most sqrt(3) voxels each.
 constexpr double reserve = 2 * 1.7320508075688772 * calmSlope;
@@ -30,7 +32,7 @@ class LeafSigns {
         for (std::size_t i = 0; i < leaves_.size(); ++i) {
             LeafState& state = leaves_[i];
             if (!state.calm()) {
-                signRough(state);
+                signSteep(state);
                 continue;
             }
             for (unsigned voxel = 0; voxel < blockVoxels; ++voxel)
@@ -104,34 +106,11 @@ class LeafSigns {
         }
     }
 
-    // Near a hole: regions of 4x4x4 voxels, each with its own slope.
-    void signRough(LeafState& state) {
-        constexpr int side = blockSide / 2;
-        for (int octant = 0; octant < 8; ++octant) {
-            const int x = octant & 4 ? side : 0, y = octant & 2 ? side : 0, z = octant & 1 ? side : 0;
-            BlockMask region{};
-            for (int i = 0; i < side * side * side; ++i)
-                set(region, unsigned(((x + i / 16) * blockSide + y + i / 4 % 4) * blockSide + z + i % 4));
-            const openvdb::Coord corner = state.leaf->origin().offsetBy(x, y, z);
-            const double slope = query_.slopeIn(query_.centre(corner, side), side - 1);
-            for (unsigned voxel = 0; voxel < blockVoxels; ++voxel)
-                if (test(region, voxel) && !test(state.known, voxel)) propagateIn(state, region, slope, voxel);
-        }
-    }
-
-    void propagateIn(LeafState& state, const BlockMask& region, double slope, unsigned voxel) {
-        const WindingSide side = decide(state, voxel);
-        if (!test(state.open, voxel)) return;
-        BlockMask front{};
-        set(front, voxel);
-        for (double left = side.margin - slope; left > 0 && any(front); left -= slope) {
-            front = grown(front);
-            for (std::size_t x = 0; x < blockSide; ++x) {
-                front[x] &= region[x] & state.open[x] & ~state.known[x];
-                state.known[x] |= front[x];
-                if (side.inside) state.inside[x] |= front[x];
-            }
-        }
+    void signSteep(LeafState& state) {
+        const WindingSteepLeaf leaf(query_, *state.leaf);
+        for (std::uint64_t& word : state.known) word = ~std::uint64_t(0);
+        state.inside = leaf.inside();
+        state.firm = leaf.fartherThan(reserve);
     }
 
     // Voxels near the surface take the sign of a neighbour that no surface can separate from them. The few others are
