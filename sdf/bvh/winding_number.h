@@ -52,6 +52,8 @@ class WindingNumber {
     double area() const { return nodes_.front().total; }  ///< of all triangles [m^2]
 
   private:
+    friend class WindingInBall;
+
     /// Error of an estimate that only decides the side, as a share of its distance to 1/2: 1, less a margin for
     /// rounding.
     static constexpr double onlySide = 0.999;

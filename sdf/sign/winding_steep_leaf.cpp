@@ -3,16 +3,21 @@
 
 #include <cmath>
 
+#include "sdf/base/progress.h"
+
 namespace bilayer::detail {
 namespace {
 
 constexpr int octantSide = blockSide / 2;
+const double octantRadius = std::sqrt(3.0) / 2 * (octantSide - 1) * (1 + 1e-9);  // to the farthest voxels [voxels]
+/// Sums of estimates are rounded by less.
+constexpr double rounding = 1e-9;
 /// Where the winding number changes by less than this per voxel, an octant's slope is good enough for its voxels.
 constexpr double calmSlope = 0.03;
 
-int octantOf(unsigned voxel) {
-    return int(voxel / (blockSide * blockSide) / octantSide * 4 + voxel / blockSide % blockSide / octantSide * 2 +
-               voxel % blockSide / octantSide);
+std::size_t octantOf(unsigned voxel) {
+    return voxel / (blockSide * blockSide) / octantSide * 4 + voxel / blockSide % blockSide / octantSide * 2 +
+           voxel % blockSide / octantSide;
 }
 
 }  // namespace
@@ -23,7 +28,9 @@ WindingSteepLeaf::WindingSteepLeaf(const WindingQuery& query, const BandLeaf& le
     for (int octant = 0; octant < 8; ++octant) {
         const openvdb::Coord corner =
             leaf.origin().offsetBy(octant / 4 * octantSide, octant / 2 % 2 * octantSide, octant % 2 * octantSide);
-        octantSlope_[std::size_t(octant)] = query.slopeIn(query.centre(corner, octantSide), octantSide);
+        Octant& o = octants_[std::size_t(octant)];
+        o.centre = query.centre(corner, octantSide);
+        o.slope = query.slopeIn(o.centre, octantSide);
     }
     // voxels away from the surface have more neighbours to reach
     const float open = (0.5f + distanceSlack) * float(query.voxelSize);
@@ -39,8 +46,19 @@ BlockMask WindingSteepLeaf::fartherThan(double margin) const {
     return result;
 }
 
+// Few voxels are so close to one half that they need a query of their own.
+WindingSide WindingSteepLeaf::sideOf(unsigned voxel) {
+    poll(query_.progress);
+    const glm::dvec3 point = query_.position(leaf_.offsetToGlobalCoord(voxel));
+    Octant& octant = octants_[octantOf(voxel)];
+    if (!octant.inBall) octant.inBall.emplace(query_.winding, octant.centre, octantRadius * query_.voxelSize);
+    const WindingNumber::Estimate e = octant.inBall->estimate(point);
+    const double margin = std::abs(e.value - 0.5) - e.error;
+    return margin > rounding ? WindingSide{e.value > 0.5, margin} : query_.at(point);
+}
+
 void WindingSteepLeaf::propagateFrom(unsigned voxel) {
-    const WindingSide side = query_.at(query_.position(leaf_.offsetToGlobalCoord(voxel)));
+    const WindingSide side = sideOf(voxel);
     reach(voxel, side.margin, side.inside);
     while (!front_.empty()) {
         const Reached from = front_.top();
@@ -77,7 +95,7 @@ void WindingSteepLeaf::reachNeighbours(const Reached& from) {
 }
 
 double WindingSteepLeaf::slopeAt(unsigned voxel) {
-    const double ofOctant = octantSlope_[std::size_t(octantOf(voxel))];
+    const double ofOctant = octants_[octantOf(voxel)].slope;
     if (ofOctant < calmSlope) return ofOctant;
     double& slope = slope_[voxel];
     if (slope < 0) slope = query_.slopeIn(query_.position(leaf_.offsetToGlobalCoord(voxel)), 1);

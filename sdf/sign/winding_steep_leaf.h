@@ -4,9 +4,11 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <queue>
 #include <utility>
 
+#include "sdf/bvh/winding_in_ball.h"
 #include "sdf/leaf/band.h"
 #include "sdf/sign/octree_cells.h"
 #include "sdf/sign/winding_query.h"
@@ -26,6 +28,13 @@ class WindingSteepLeaf {
   private:
     using Reached = std::pair<double, unsigned>;  // the margin of a voxel, and its number
 
+    struct Octant {  // 4x4x4 voxels
+        glm::dvec3 centre;
+        double slope;                         // of its voxels and halfway to their neighbours
+        std::optional<WindingInBall> inBall;  // once a voxel is asked for
+    };
+
+    WindingSide sideOf(unsigned voxel);
     void propagateFrom(unsigned voxel);
     void reach(unsigned voxel, double margin, bool isInside);
     void reachNeighbours(const Reached& from);
@@ -36,7 +45,7 @@ class WindingSteepLeaf {
     BlockMask inside_{};
     std::array<double, blockVoxels> margin_;  // lower bound of the number's distance to one half; negative: unknown
     std::array<double, blockVoxels> slope_;   // halfway to all neighbours [1/voxel]; negative: not asked for yet
-    std::array<double, 8> octantSlope_;       // of 4x4x4 voxels each
+    std::array<Octant, 8> octants_;
     std::priority_queue<Reached> front_;
 };
 

@@ -12,6 +12,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/bvh/winding_in_ball.h"
 #include "sdf/bvh/winding_number.h"
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
@@ -127,6 +128,34 @@ TEST_CASE("the winding number is on the side of a half that brute force finds") 
     }
 }
 
+TEST_CASE("the winding number in a ball is that of brute force within its bound") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(-1.3, 1.3), unit(0, 1);
+    const Mesh sphere = shapes::sphere(1, 4);
+    for (const Mesh& mesh : {sphere, without(sphere, [](const glm::vec3& p) { return p.z > 0.3f; }),
+                             soup(glm::vec3(0.5f), 3000, seed), shapes::box({1, 0.5f, 0.01f}, 3)}) {
+        const WindingNumber winding(mesh);
+        double bounds = 0;
+        for (int i = 0; i < 200; ++i) {
+            const glm::dvec3 centre(uniform(random), uniform(random), uniform(random));
+            const double radius = std::pow(10, -3 * unit(random));
+            const WindingInBall inBall(winding, centre, radius);
+            for (int j = 0; j < 10; ++j) {
+                const glm::dvec3 direction(uniform(random), uniform(random), uniform(random));
+                const glm::dvec3 p = centre + unit(random) * radius * glm::normalize(direction);
+                const double exact = test::windingNumber(mesh, p);
+                const auto estimate = inBall.estimate(p);
+                CAPTURE(p.x, p.y, p.z, radius, exact, estimate.value, estimate.error);
+                REQUIRE(std::abs(estimate.value - exact) <= estimate.error + 1e-10);
+                bounds += estimate.error / 2000;
+            }
+        }
+        CHECK(bounds < 0.2);  // it decides most sides
+    }
+}
+
 TEST_CASE("the expansion about a far cluster is of second order") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
@@ -134,20 +163,28 @@ TEST_CASE("the expansion about a far cluster is of second order") {
     std::normal_distribution<double> normal;
     const Mesh mesh = soup({1, 0.7f, 0.4f}, 60, seed);
     const WindingNumber winding(mesh);
-    double near = 0, far = 0;
+    double near = 0, far = 0, nearInBall = 0, farInBall = 0;
     for (int i = 0; i < 100; ++i) {
         const glm::dvec3 direction = glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
-        const auto error = [&](double distance) {
-            return std::abs(winding(distance * direction) - test::windingNumber(mesh, distance * direction));
+        const glm::dvec3 offset = glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
+        const auto check = [&](double distance, double& error, double& errorInBall) {
+            const glm::dvec3 p = distance * direction;
+            const double exact = test::windingNumber(mesh, p);
+            error = std::max(error, std::abs(winding(p) - exact));
+            errorInBall =
+                std::max(errorInBall, std::abs(WindingInBall(winding, p + offset, 1).estimate(p).value - exact));
         };
-        near = std::max(near, error(40));
-        far = std::max(far, error(80));
+        check(40, near, nearInBall);
+        check(80, far, farInBall);
     }
-    CAPTURE(near, far);
+    CAPTURE(near, far, nearInBall, farInBall);
     // the first omitted term falls with the fifth power of the distance
     CHECK(far > 0);
     CHECK(near / far > 28);
     CHECK(near / far < 37);
+    CHECK(farInBall > 0);
+    CHECK(nearInBall / farInBall > 28);
+    CHECK(nearInBall / farInBall < 37);
 }
 
 TEST_CASE("a point in the opening of a hemisphere sees half of all directions up to its own precision") {

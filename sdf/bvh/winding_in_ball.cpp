@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sdf/bvh/winding_in_ball.h"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+
+namespace bilayer::detail {
+namespace {
+
+/// A cluster is far if its radius and the ball's are at most this share of the distance of their centres. The bound of
+/// its error is then at most a seventh of the solid angle that it can fill.
+constexpr double farRatio = 0.25;
+/// A cluster is expanded for each point if its radius is at most this share of its distance from the ball.
+constexpr double clusterRatio = 0.35;
+
+// Returns m u.
+glm::dvec3 times(const Symmetric2& m, const glm::dvec3& u) {
+    return {m[0] * u.x + m[3] * u.y + m[5] * u.z, m[3] * u.x + m[1] * u.y + m[4] * u.z,
+            m[5] * u.x + m[4] * u.y + m[2] * u.z};
+}
+
+}  // namespace
+
+WindingInBall::WindingInBall(const WindingNumber& winding, const glm::dvec3& centre, double radius)
+    : winding_(winding), centre_(centre) {
+    std::vector<std::uint32_t> open{0};
+    while (!open.empty()) {
+        const std::uint32_t at = open.back();
+        open.pop_back();
+        const Node& node = winding.nodes_[at];
+        const glm::dvec3 toCentre = node.centre - centre;
+        const double distance = glm::length(toCentre);
+        if (node.radius + radius < farRatio * distance)
+            addFar(node, toCentre, radius);
+        else if (node.radius < clusterRatio * (distance - radius))
+            clusters_.push_back(&node);
+        else if (node.right == 0)
+            leaves_.push_back(&node);
+        else
+            open.insert(open.end(), {node.right, at + 1});
+    }
+}
+
+// A displacement d of the point is one of -d of all triangles: the moments of the cluster about its centre, less d, are
+// polynomials in d, and so is the expansion of WindingNumber. Its bound holds for |s - d| in place of |s|, whose square
+// integrates to at most (sqrt(spread) + radius sqrt(total))^2.
+void WindingInBall::addFar(const Node& node, const glm::dvec3& toCentre, double radius) {
+    const double squared = glm::dot(toCentre, toCentre), distance = std::sqrt(squared);
+    const double t = (node.radius + radius) / distance, unit = 1 / (4 * glm::pi<double>() * squared);
+    const double spread = std::sqrt(node.spread) + radius * std::sqrt(node.total);
+    far_.error += unit * spread * spread / squared * t * (4 - 3 * t) / ((1 - t) * (1 - t));
+    far_.value += winding_.expansion(node, centre_).value;
+    const glm::dvec3 u = toCentre / distance, mu = times(node.moment, u);
+    const double au = glm::dot(node.area, u), umu = glm::dot(u, mu);
+    const double sum = node.moment[0] + node.moment[1] + node.moment[2];
+    slope_ += unit / distance * (3 * au * u - node.area) + unit / squared * (6.0 * mu + 3 * sum * u - 15 * umu * u);
+    const double scale = unit / squared;
+    add(curvature_, product(u, u), 7.5 * au * scale);
+    add(curvature_, product(node.area, u), -3 * scale);
+    for (std::size_t axis = 0; axis < 3; ++axis) curvature_[axis] -= 1.5 * au * scale;
+}
+
+WindingNumber::Estimate WindingInBall::estimate(const glm::dvec3& point) const {
+    const glm::dvec3 d = point - centre_;
+    WindingNumber::Estimate sum{far_.value + glm::dot(d, slope_ + times(curvature_, d)), far_.error};
+    for (const Node* cluster : clusters_) {
+        const WindingNumber::Estimate part = winding_.expansion(*cluster, point);
+        sum.value += part.value;
+        sum.error += part.error;
+    }
+    for (const Node* leaf : leaves_) sum.value += winding_.solidAngles(*leaf, point);
+    return sum;
+}
+
+}  // namespace bilayer::detail
