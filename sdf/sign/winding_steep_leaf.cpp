@@ -54,7 +54,7 @@ WindingSide WindingSteepLeaf::sideOf(unsigned voxel) {
     if (!octant.inBall) octant.inBall.emplace(query_.winding, octant.centre, octantRadius * query_.voxelSize);
     const WindingNumber::Estimate e = octant.inBall->estimate(point);
     const double margin = std::abs(e.value - 0.5) - e.error;
-    return margin > rounding ? WindingSide{e.value > 0.5, margin} : query_.at(point);
+    return margin > rounding ? WindingSide{e.value > 0.5, margin} : WindingSide{query_.winding.isInside(point), 0};
 }
 
 void WindingSteepLeaf::propagateFrom(unsigned voxel) {
