@@ -15,6 +15,7 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
+#include "bench/ratios.h"
 #include "sdf/fill/double_layer.h"
 
 using namespace bilayer;
@@ -195,6 +196,21 @@ void printSummary(const std::vector<Row>& rows, const Required& required) {
         }
 }
 
+// The rounds of each builder and of its reference, on each count of threads.
+void addRatios(const std::vector<Row>& rows, Ratios& ratios) {
+    for (const Row& row : rows)
+        for (const Row& other : rows) {
+            if (row.builder == Builder::reference || other.builder != Builder::reference || other.mesh != row.mesh ||
+                other.resolution != row.resolution || other.halfWidth != row.halfWidth)
+                continue;
+            for (const auto& [threads, seconds] : row.seconds)
+                if (const auto rival = other.seconds.find(threads); rival != other.seconds.end())
+                    ratios.add(fmt::format("{}, half width {}, {} at {} voxels, {} threads / {}", nameOf(row.builder),
+                                           row.halfWidth, row.mesh, row.resolution, threads, nameOf(other.builder)),
+                               rival->second, seconds);
+        }
+}
+
 void writeJson(const std::string& path, const std::vector<Row>& rows) {
     nlohmann::json list = nlohmann::json::array();
     for (const Row& row : rows) {
@@ -264,6 +280,8 @@ int run(int argc, char** argv) {
     app.add_option("--json", options.json, "also write all times to this file");
     app.add_flag("--no-memory", noMemory, "leave out the peaks of memory");
     app.add_flag("--quick", quick, "only 128 voxels and few repetitions");
+    Ratios ratios("build");
+    ratios.addOption(app);
     CLI11_PARSE(app, argc, argv);
     options.memory = !noMemory;
     if (quick) {
@@ -285,6 +303,8 @@ int run(int argc, char** argv) {
     const std::vector<Row> rows = compare(meshes, options);
     printSummary(rows, options.cold ? requiredCold : requiredWarm);
     if (!options.json.empty()) writeJson(options.json, rows);
+    addRatios(rows, ratios);
+    ratios.write();
     return 0;
 }
 

@@ -16,6 +16,7 @@
 #include "bench/fcl.h"
 #include "bench/measure.h"
 #include "bench/program.h"
+#include "bench/ratios.h"
 #include "demos/shared/shapes.h"
 
 using namespace bilayer;
@@ -105,23 +106,24 @@ double timeOf(const Poses& poses, std::vector<double>& answers, Ask&& ask) {
 }
 
 struct Row {
-    double ours, fcl, off;
+    std::vector<double> ours, fcl;  // of each round
+    double off = 0;                 // the largest difference of the answers
 };
 
 Row race(const Body& a, const Body& b, const Poses& poses, bool keepsStart, int rounds) {
-    std::vector<double> ours, fcl, oursAnswers, fclAnswers;
+    Row row;
+    std::vector<double> oursAnswers, fclAnswers;
     for (int round = 0; round < rounds; ++round) {
         DistanceStart start;
-        ours.push_back(timeOf(poses, oursAnswers, [&](const Pose& p, const Pose& q) {
+        row.ours.push_back(timeOf(poses, oursAnswers, [&](const Pose& p, const Pose& q) {
             return double(distance({a.collider, p}, {b.collider, q}, {}, keepsStart ? &start : nullptr).distance);
         }));
-        fcl.push_back(
+        row.fcl.push_back(
             timeOf(poses, fclAnswers, [&](const Pose& p, const Pose& q) { return a.fcl.distanceTo(b.fcl, p, q); }));
     }
-    double off = 0;
     for (std::size_t i = 0; i < poses.size(); ++i)
-        if (oursAnswers[i] > 0) off = std::max(off, std::abs(oursAnswers[i] - fclAnswers[i]));
-    return {median(ours), median(fcl), off};
+        if (oursAnswers[i] > 0) row.off = std::max(row.off, std::abs(oursAnswers[i] - fclAnswers[i]));
+    return row;
 }
 
 int run(int argc, char** argv) {
@@ -133,6 +135,8 @@ int run(int argc, char** argv) {
     app.add_option("--steps", options.steps, "of the motion")->capture_default_str();
     app.add_option("--rounds", options.rounds, "the median counts")->capture_default_str();
     app.add_option("--seed", options.seed)->capture_default_str();
+    Ratios ratios("distance");
+    ratios.addOption(app);
     CLI11_PARSE(app, argc, argv);
     const std::vector<Body> all = bodies(options);
     fmt::print(
@@ -149,17 +153,24 @@ int run(int argc, char** argv) {
                 const Row cold = race(all[i], all[k], poses, false, options.rounds);
                 const Row warm =
                     race(all[i], all[k], motion(poses.front(), options.steps, poser), true, options.rounds);
-                unrelated.push_back(cold.fcl / cold.ours);
-                moving.push_back(warm.fcl / warm.ours);
+                const double coldOurs = median(cold.ours), coldFcl = median(cold.fcl), warmOurs = median(warm.ours),
+                             warmFcl = median(warm.fcl);
+                unrelated.push_back(coldFcl / coldOurs);
+                moving.push_back(warmFcl / warmOurs);
+                const std::string what =
+                    fmt::format("{} and {}, {:g} % apart", all[i].name, all[k].name, 100 * separation);
+                ratios.add(what + " / FCL", cold.fcl, cold.ours);
+                ratios.add(what + ", in motion / FCL", warm.fcl, warm.ours);
                 fmt::print(
                     "| {}, {} | {}, {} | {:g} % | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} | {:.1g} |\n",
                     all[i].name, all[k].name, all[i].mesh.triangles.size(), all[k].mesh.triangles.size(),
-                    100 * separation, cold.ours, cold.fcl, unrelated.back(), warm.ours, warm.fcl, moving.back(),
+                    100 * separation, coldOurs, coldFcl, unrelated.back(), warmOurs, warmFcl, moving.back(),
                     std::max(cold.off, warm.off));
                 std::fflush(stdout);
             }
     fmt::print("\nGeometric mean of the ratios: {:.1f} for unrelated poses, {:.1f} in motion\n",
                geometricMean(unrelated), geometricMean(moving));
+    ratios.write();
     return 0;
 }
 

@@ -27,6 +27,7 @@
 #include "bench/command.h"
 #include "bench/measure.h"
 #include "bench/program.h"
+#include "bench/ratios.h"
 #include "sdf/base/openvdb.h"
 
 using namespace bilayer;
@@ -184,7 +185,13 @@ struct Means {
     }
 };
 
-void measure(const Options& options, const fs::path& scratch) {
+void addRatio(const Contest& c, const std::string& what, const std::string& rival, const std::string& ours,
+              Ratios& ratios) {
+    const auto a = c.seconds.find(rival), b = c.seconds.find(ours);
+    if (a != c.seconds.end() && b != c.seconds.end()) ratios.add(what + ours + " / " + rival, a->second, b->second);
+}
+
+void measure(const Options& options, const fs::path& scratch, Ratios& ratios) {
     Means means;
     fmt::print(
         "Medians of {} runs of whole commands on {} threads, the page cache warm; {} voxels along the longest "
@@ -213,6 +220,10 @@ void measure(const Options& options, const fs::path& scratch) {
                        cell(ratio(c, "Assimp + OpenVDB", "bilayer"), 1), cell(1e3 * medianOf(c, "read, bilayer"), 1),
                        cell(1e3 * medianOf(c, "read, Assimp"), 1), cell(ratio(c, "read, Assimp", "read, bilayer"), 1));
             std::fflush(stdout);
+            const std::string what = fmt::format("{}, {}: ", name, format);
+            addRatio(c, what, "vdb_tool", "bilayer", ratios);
+            addRatio(c, what, "Assimp + OpenVDB", "bilayer", ratios);
+            addRatio(c, what, "read, Assimp", "read, bilayer", ratios);
             Means::add(means.vdbTool, ratio(c, "vdb_tool", "bilayer"));
             Means::add(means.assimpVdb, ratio(c, "Assimp + OpenVDB", "bilayer"));
             Means::add(means.reading[format], ratio(c, "read, Assimp", "read, bilayer"));
@@ -244,14 +255,17 @@ int run(int argc, char** argv) {
                      ->check(CLI::IsMember({"build", "read", "read-assimp"}));
     app.add_option("--mesh", options.mesh)->needs(work);
     app.add_option("--output", options.output)->needs(work);
+    Ratios ratios("files");
+    ratios.addOption(app);
     CLI11_PARSE(app, argc, argv);
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(options.threads));
     if (options.work == "build") return buildByOpenVdb(options), 0;
     if (!options.work.empty()) return readOnly(options, options.work == "read-assimp"), 0;
     const fs::path scratch = fs::temp_directory_path() / fmt::format("bilayer-bench-files-{}", ::getpid());
     fs::create_directories(scratch);
-    measure(options, scratch);
+    measure(options, scratch, ratios);
     fs::remove_all(scratch);
+    ratios.write();
     return 0;
 }
 

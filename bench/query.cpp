@@ -141,13 +141,21 @@ void requireAlike(const std::vector<RayCaster>& peers, const Questions<Ray>& que
     }
 }
 
+// What one contest belongs to.
+struct Subject {
+    std::string name;
+    float voxelSize;  // [m]
+};
+
 // Compares the answers, times the peers in turns, and prints.
 template <class Question, class Answer>
 std::vector<Time> contest(const std::string& title, const std::vector<Peer<Question, Answer>>& peers,
-                          const std::vector<Questions<Question>>& orders, float voxelSize, const Options& options) {
+                          const std::vector<Questions<Question>>& orders, const Subject& subject,
+                          const Options& options, Ratios& ratios) {
     fmt::print("\n### {}\n\n", title);
-    for (const auto& questions : orders) requireAlike(peers, questions, voxelSize);
+    for (const auto& questions : orders) requireAlike(peers, questions, subject.voxelSize);
     const std::vector<Time> times = race(peers, orders, options.threads, options.rounds);
+    addRatios(times, subject.name + ", " + title, ours, ratios);
     fmt::print("\n{}", table(times, ours));
     std::fflush(stdout);
     return times;
@@ -194,7 +202,7 @@ double medianSeconds(int rounds, const Work& work) {
     return median(seconds);
 }
 
-nlohmann::json compare(const Source& source, float resolution, const Options& options) {
+nlohmann::json compare(const Source& source, float resolution, const Options& options, Ratios& ratios) {
     const Scene scene = bench::scene(source, resolution);
     const BuildOptions how{.voxelSize = scene.voxelSize,
                            .exteriorWidthVoxels = options.halfWidth,
@@ -218,25 +226,26 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
         100 * meshSeconds / buildSeconds);
 
     const float voxelSize = levelSet.voxelSize();
+    const Subject subject{fmt::format("{}, {:g} voxels", scene.name, resolution), voxelSize};
     const auto points = pointsInBand(field, levelSet, options.points, options.seed);
     const auto samples = contest<glm::vec3, Sample>(
         "Value and gradient",
         {openvdbSampler(grid), openvdbStencil(grid), openvdbCell(grid), nanovdb.sampler(),
          singleSamples(ours + " sample", field), batchedSamples(ours + " sample, batched", field),
          singleSamples(ours + " sample, 16 bits", small), batchedSamples(ours + " sample, 16 bits, batched", small)},
-        points, voxelSize, options);
+        points, subject, options, ratios);
     const nlohmann::json floor = floors(levelSet, field.memoryBytes(), points, options);
     const auto nearest = contest<glm::vec3, ClosestPoint>(
         "Closest point",
         {embree.closest("Embree rtcPointQuery", infinity),
          embree.closest("Embree rtcPointQuery, no farther than the band", options.halfWidth * voxelSize),
          singleClosest(withMesh), batchedClosest(withMesh)},
-        pointsInBand(field, levelSet, options.others, options.seed), voxelSize, options);
+        pointsInBand(field, levelSet, options.others, options.seed), subject, options, ratios);
     const auto rays =
         contest<Ray, RayHit>("Rays",
                              {robust.rays(), openvdbRays(grid), singleRays(ours + " raycast, without the mesh", field),
                               singleRays(ours + " raycast", withMesh)},
-                             raysOnto(field, options.others, options.seed), voxelSize, options);
+                             raysOnto(field, options.others, options.seed), subject, options, ratios);
     return {{"mesh", scene.name},
             {"resolution", resolution},
             {"bytes",
@@ -267,11 +276,14 @@ int run(int argc, char** argv) {
         ->check(CLI::PositiveNumber);
     app.add_option("--seed", options.seed, "seed of points and rays")->capture_default_str();
     app.add_option("--json", options.json, "also write all numbers to this file");
+    Ratios ratios("query");
+    ratios.addOption(app);
     CLI11_PARSE(app, argc, argv);
     nlohmann::json grids;
     for (const float resolution : options.resolutions)
-        grids.push_back(compare(findSource(options.mesh), resolution, options));
+        grids.push_back(compare(findSource(options.mesh), resolution, options, ratios));
     if (!options.json.empty()) std::ofstream(options.json) << grids.dump(2) << "\n";
+    ratios.write();
     return 0;
 }
 

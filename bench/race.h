@@ -12,6 +12,7 @@
 
 #include "bench/measure.h"
 #include "bench/peers.h"
+#include "bench/ratios.h"
 
 namespace bilayer::bench {
 
@@ -26,7 +27,8 @@ struct Questions {
 struct Time {
     std::string peer, order;
     int threads;
-    double nanoseconds;  ///< per query, all threads together; the median of all rounds
+    double nanoseconds;          ///< per query, all threads together; the median of all rounds
+    std::vector<double> rounds;  ///< of each round [s per query]
 };
 
 /// Seconds that a peer takes for all queries, one batch per thread.
@@ -51,18 +53,17 @@ std::vector<Time> race(const std::vector<Peer<Question, Answer>>& peers, const s
     std::vector<Time> times;
     for (const auto& peer : peers)
         for (const auto& order : orders)
-            for (const int count : threads) times.push_back({peer.name, order.order, count, 0});
-    std::vector<std::vector<double>> seconds(times.size());
+            for (const int count : threads) times.push_back({peer.name, order.order, count, 0, {}});
     for (int round = 0; round < rounds; ++round)
         for (std::size_t order = 0; order < orders.size(); ++order)
             for (std::size_t t = 0; t < threads.size(); ++t)
                 for (std::size_t peer = 0; peer < peers.size(); ++peer) {
                     const std::span<const Question> questions = orders[order].all;
                     std::vector<Answer> answers(questions.size());
-                    seconds[(peer * orders.size() + order) * threads.size() + t].push_back(
+                    times[(peer * orders.size() + order) * threads.size() + t].rounds.push_back(
                         secondsOf(peers[peer], questions, std::span(answers), threads[t]) / double(questions.size()));
                 }
-    for (std::size_t i = 0; i < times.size(); ++i) times[i].nanoseconds = 1e9 * median(seconds[i]);
+    for (Time& time : times) time.nanoseconds = 1e9 * median(time.rounds);
     return times;
 }
 
@@ -100,6 +101,20 @@ inline std::string table(const std::vector<Time>& times, const std::string& ours
             text += "\n";
         }
     return text;
+}
+
+/// Adds the ratios of each of `ours` to each other peer.
+/// @param what  was asked, and on which field
+/// @param ours  prefix of the names of our own peers
+inline void addRatios(const std::vector<Time>& times, const std::string& what, const std::string& ours,
+                      Ratios& ratios) {
+    for (const Time& mine : times)
+        for (const Time& other : times)
+            if (mine.peer.starts_with(ours) && !other.peer.starts_with(ours) && mine.order == other.order &&
+                mine.threads == other.threads)
+                ratios.add(
+                    fmt::format("{}: {}, {}, {} threads / {}", what, mine.peer, mine.order, mine.threads, other.peer),
+                    other.rounds, mine.rounds);
 }
 
 inline nlohmann::json toJson(const std::vector<Time>& times) {

@@ -11,6 +11,7 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
+#include "bench/ratios.h"
 #include "demos/shared/shapes.h"
 
 using namespace bilayer;
@@ -50,16 +51,14 @@ double secondsOf(const Scene& scene, const Job& job, double atLeast) {
 }
 
 // The builders take turns; a first round that is not counted touches the memory.
-std::vector<double> medians(const Scene& scene, const std::vector<Job>& jobs, const Options& options) {
+std::vector<std::vector<double>> race(const Scene& scene, const std::vector<Job>& jobs, const Options& options) {
     std::vector<std::vector<double>> seconds(jobs.size());
     for (int round = 0; round <= options.rounds; ++round)
         for (std::size_t i = 0; i < jobs.size(); ++i) {
             const double of = secondsOf(scene, jobs[i], options.seconds);
             if (round > 0) seconds[i].push_back(of);
         }
-    std::vector<double> result;
-    for (const auto& some : seconds) result.push_back(median(some));
-    return result;
+    return seconds;
 }
 
 struct Worst {
@@ -67,19 +66,20 @@ struct Worst {
     std::string where;
 };
 
-void printRow(const Scene& scene, int threads, const Options& options, Worst& worst) {
+void printRow(const Scene& scene, int threads, const Options& options, Worst& worst, Ratios& ratios) {
     std::vector<Job> jobs;
     for (const Contest& contest : contests)
         for (const Builder builder : {contest.builder, Builder::reference})
             jobs.push_back({builder, contest.halfWidth, threads});
-    const std::vector<double> seconds = medians(scene, jobs, options);
+    const std::vector<std::vector<double>> seconds = race(scene, jobs, options);
     fmt::print("| {} | {} | {} |", scene.mesh.triangles.size(), scene.resolution, threads);
     for (std::size_t i = 0; i < seconds.size(); i += 2) {
-        const double ratio = seconds[i + 1] / seconds[i];
-        fmt::print(" {:.0f} | {:.0f} | {:.1f} |", 1e6 * seconds[i], 1e6 * seconds[i + 1], ratio);
-        if (ratio < worst.ratio)
-            worst = {ratio, fmt::format("{}, {} triangles, {} voxels, {} threads", nameOf(jobs[i].builder),
-                                        scene.mesh.triangles.size(), scene.resolution, threads)};
+        const double ours = median(seconds[i]), rival = median(seconds[i + 1]), ratio = rival / ours;
+        const std::string what = fmt::format("{}, {} triangles, {} voxels, {} threads", nameOf(jobs[i].builder),
+                                             scene.mesh.triangles.size(), scene.resolution, threads);
+        fmt::print(" {:.0f} | {:.0f} | {:.1f} |", 1e6 * ours, 1e6 * rival, ratio);
+        ratios.add(what + " / meshToVolume", seconds[i + 1], seconds[i]);
+        if (ratio < worst.ratio) worst = {ratio, what};
     }
     fmt::print("\n");
     std::fflush(stdout);
@@ -93,7 +93,7 @@ void printFixedCost(const Options& options) {
     const Scene smallest = scene("triangle", triangle, 1);
     for (const int threads : options.threads)
         for (const Contest& contest : contests) {
-            const double seconds = medians(smallest, {{contest.builder, contest.halfWidth, threads}}, options)[0];
+            const double seconds = median(race(smallest, {{contest.builder, contest.halfWidth, threads}}, options)[0]);
             fmt::print("A triangle of one voxel, {}, {} thread{}: {:.0f} us\n", nameOf(contest.builder), threads,
                        threads > 1 ? "s" : "", 1e6 * seconds);
         }
@@ -109,6 +109,8 @@ int run(int argc, char** argv) {
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
     app.add_option("--seconds", options.seconds, "time of each builder in a round [s]")->capture_default_str();
+    Ratios ratios("small");
+    ratios.addOption(app);
     CLI11_PARSE(app, argc, argv);
     fmt::print("Microseconds per build, medians of {} rounds in turns.\n\n", options.rounds);
     fmt::print(
@@ -118,10 +120,11 @@ int run(int argc, char** argv) {
     for (const Mesh& mesh : meshes())
         for (const float resolution : options.resolutions) {
             const Scene small = scene("small", mesh, resolution);
-            for (const int threads : options.threads) printRow(small, threads, options, worst);
+            for (const int threads : options.threads) printRow(small, threads, options, worst, ratios);
         }
     fmt::print("\nSmallest ratio: {:.1f} ({} required), {}\n", worst.ratio, ratioRequired, worst.where);
     printFixedCost(options);
+    ratios.write();
     return 0;
 }
 
