@@ -16,6 +16,7 @@
 
 #include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
+#include "sdf/grid/tile_flood.h"
 #include "sdf/leaf/sign_propagation.h"
 
 namespace bilayer::detail {
@@ -35,6 +36,7 @@ std::unique_ptr<TriangleGridLeaf> triangleLeaf(const std::int32_t* triangles, co
     return leaf;
 }
 
+constexpr int depthOfLargeTiles = 1;        // in OpenVDB's tree: of tiles as large as a SmallNode
 constexpr std::size_t leavesPerPoll = 256;  // takes tens of microseconds
 
 // Gathers the first voxels of all rows of a slice into one byte, one bit per row.
@@ -95,9 +97,10 @@ const BlockFace forwardFaces[3] = {{{blockSide, 0, 0}, lastLayer* xStep, yStep, 
 class ConflictCounter {
   public:
     /// @param part  null: the whole field
-    ConflictCounter(const openvdb::FloatTree& tree, const std::vector<FaceBits>& faces, float voxelSize,
-                    const FieldPart* part)
-        : tree_(tree), faces_(faces), voxel_(voxelSize), part_(part) {}
+    /// @param largeTiles  origins of the tiles of the tree's largest nodes that may be inside
+    ConflictCounter(const openvdb::FloatTree& tree, const std::vector<FaceBits>& faces,
+                    const std::vector<openvdb::Coord>& largeTiles, float voxelSize, const FieldPart* part)
+        : tree_(tree), faces_(faces), largeTiles_(largeTiles), voxel_(voxelSize), part_(part) {}
 
     std::size_t count() const {
         const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(tree_);
@@ -118,10 +121,8 @@ class ConflictCounter {
     // large inside tiles next to the space outside of all nodes.
     std::size_t atLargeTiles() const {
         std::size_t sum = 0;
-        for (auto node = tree_.root().cbeginChildOn(); node; ++node)
-            for (openvdb::Index n = 0; n < LargeNode::NUM_VALUES; ++n)
-                if (node->isChildMaskOff(n) && node->getTable()[n].getValue() < 0)
-                    sum += towardsOutside(node->offsetToGlobalCoord(n));
+        for (const openvdb::Coord& tile : largeTiles_)
+            if (tree_.getValueDepth(tile) <= depthOfLargeTiles && tree_.getValue(tile) < 0) sum += towardsOutside(tile);
         return sum;
     }
 
@@ -142,7 +143,7 @@ class ConflictCounter {
     }
 
     std::size_t towardsOutside(const openvdb::Coord& tile) const {
-        constexpr int side = LargeNode::ChildNodeType::DIM, depthOfLargeTiles = 1;
+        constexpr int side = SmallNode::DIM;
         std::size_t sum = 0;
         for (int axis = 0; axis < 3; ++axis)
             for (const int step : {-side, side}) {
@@ -201,6 +202,7 @@ class ConflictCounter {
 
     const openvdb::FloatTree& tree_;
     const std::vector<FaceBits>& faces_;
+    const std::vector<openvdb::Coord>& largeTiles_;
     float voxel_;
     const FieldPart* part_;
 };
@@ -311,7 +313,12 @@ openvdb::FloatGrid::Ptr Assembler::distances(float exterior, float interior) {
     } else {
         // leaves already have signs, so only tiles between them are flooded; uniform leaves beyond the band become
         // tiles too
-        openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
+        forEachBranch([&](Branch& branch) { floodTiles(*branch.node, interior, [](openvdb::Index) {}); });
+        for (auto node = grid->tree().root().beginChildOn(); node; ++node)
+            floodTiles(*node, interior, [&](openvdb::Index n) { largeTiles_.push_back(node->offsetToGlobalCoord(n)); });
+        openvdb::tools::SignedFloodFillOp<openvdb::FloatTree>(exterior, interior)(grid->tree().root());
+        for (const Branch& branch : branches)
+            if (branch.plain.size() == branch.leaves.size()) largeTiles_.push_back(branch.node->origin());
         forEachBranch([](Branch& branch) {
             for (const Leaf* leaf : branch.plain) {
                 const float value = leaf->getFirstValue();  // remove the leaf before its tile is added
@@ -339,7 +346,7 @@ openvdb::Int32Grid::Ptr Assembler::triangles() {
 }
 
 std::size_t Assembler::conflicts(const openvdb::FloatGrid& distances) const {
-    return ConflictCounter(distances.tree(), faces_, float(distances.voxelSize()[0]), part_).count();
+    return ConflictCounter(distances.tree(), faces_, largeTiles_, float(distances.voxelSize()[0]), part_).count();
 }
 
 }  // namespace bilayer::detail

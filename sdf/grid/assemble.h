@@ -86,7 +86,8 @@ class Assembler {
     const FieldPart* part_;
     PerThread<Collected> leaves_;
     PerThread<std::unique_ptr<TriangleGridLeaf>> triangleLeaves_;
-    std::vector<FaceBits> faces_;  // of each leaf; the leaf's transient data is the index
+    std::vector<FaceBits> faces_;             // of each leaf; the leaf's transient data is the index
+    std::vector<openvdb::Coord> largeTiles_;  // origins of those of the tree's largest nodes that may be inside
 };
 
 }  // namespace bilayer::detail
