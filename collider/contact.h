@@ -92,9 +92,8 @@ struct ContactOptions {
     /// The same limit for face points that do not touch yet. A point next to the other body sees its edge obliquely, or
     /// approaches its side, and would be blocked there.
     float minNormalCosineApart = 0.9f;
-    /// Whether face points keep contacts with edges that they see at more than half a degree off their normal. Applies
-    /// to points that neither touch nor approach. Such contacts are redundant: the edges' own points meet the faces
-    /// perpendicularly.
+    /// Whether face points that do not touch yet keep contacts with edges that they see at more than half a degree off
+    /// their normal. Such contacts are redundant: the edges' own points meet the faces perpendicularly.
     bool keepsObliqueEdges = false;
     /// Reduces the contacts to those that a solver needs: for each patch of contacts with similar normals up to twelve,
     /// those that any small motion of the bodies meets first. They bear the same loads as all contacts. With a

@@ -27,13 +27,14 @@ glm::vec3 outwardNormal(const Placed& other, const SurfaceSample& sample, const 
     return sample.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * sample.normal;
 }
 
-// The outward normal of the surface near a place in the world; zero where the field has none.
+// The outward normal of the surface near a place in the world, by the triangles if the field has them: samples within a
+// voxel of an edge are oblique on either side. Zero where the field has no normal.
 glm::vec3 normalNear(const Placed& body, const glm::vec3& place) {
     const glm::vec3 at = body.pose.toBody(place) / body.scale;
-    const ContactField surface(body.collider, false);
-    const Sample sample = surface.field().sample(at);
+    const Field& field = body.collider.field();
+    const Sample sample = field.sample(at);
     if (!sample.inBand) return glm::vec3(0);
-    return body.pose.rotation * surface.inBand(at, sample).normal;
+    return body.pose.rotation * surfaceSampleAt(field, at, sample, field.mesh() != nullptr).normal;
 }
 
 // Adds the contacts of A's points in the field of B, then of B's points in the field of A, as the visits find them.
@@ -50,7 +51,7 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
                                       [&](const glm::vec3& place) { return normalNear(other, place); });
         };
         return passesNormalFilter(options, normal, own, body.motion.rotation - other.motion.rotation,
-                                  sample.distance > 0 && !point.isSharp, sample.approach > 0, facesEdge);
+                                  sample.distance > 0 && !point.isSharp, facesEdge);
     };
     // points are fixed to their body, places between them are not
     const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {

@@ -170,7 +170,7 @@ class PointsOnConvex {
                                       [&](const glm::vec3& place) { return body_.nearest(place).normal; });
         };
         if (!passesNormalFilter(body_.options, -normal, point.normal, -local_.relativeMotion().rotation(), isSeparated,
-                                approach != 0, facesEdge))
+                                facesEdge))
             return;
         if (!convex_.isFlat(nearest)) {
             // vertices and edges are exact, and samples next to them are not

@@ -161,7 +161,7 @@ std::optional<Contact> FaceContacts::contactAtFoot(const glm::vec3& foot, const 
         return there.distance > 0 && facesEdgeObliquely(foot, -normal, there.distance, there.normal, normalAt);
     };
     if (!passesNormalFilter(field_.options, contact->normal, -(rotation * normal),
-                            rotation * field_.local.relativeMotion().rotation(), isSeparated, false, facesEdge))
+                            rotation * field_.local.relativeMotion().rotation(), isSeparated, facesEdge))
         return std::nullopt;
     setNormal(*contact, field_, normal);
     contact->turningRadius = -1;  // it stays below the point

@@ -51,13 +51,13 @@ inline bool passesNormalFilter(const ContactOptions& options, const glm::vec3& s
     });
 }
 
-/// The same, and a separated point that does not approach must not face an edge obliquely.
+/// The same, and a separated point must not face an edge obliquely.
 /// @param facesEdge  bool (): facesEdgeObliquely() for this contact
 template <class FacesEdge>
 bool passesNormalFilter(const ContactOptions& options, const glm::vec3& surfaceNormal, const glm::vec3& normal,
-                        const glm::vec3& rotation, bool isSeparated, bool isApproaching, FacesEdge&& facesEdge) {
+                        const glm::vec3& rotation, bool isSeparated, FacesEdge&& facesEdge) {
     if (!passesNormalFilter(options, surfaceNormal, normal, rotation, isSeparated)) return false;
-    return options.keepsObliqueEdges || !isSeparated || isApproaching || !facesEdge();
+    return options.keepsObliqueEdges || !isSeparated || !facesEdge();
 }
 
 /// Whether a face point next to another surface faces an edge of that surface obliquely. The surface normal is

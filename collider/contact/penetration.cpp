@@ -26,8 +26,9 @@ namespace {
 // Depth of the test points inside their own body [voxels]. Contacts handle shallower penetration, so that a body that
 // slides along another one is not stopped.
 constexpr float testDepth = 0.25f;
-// Maximum depth of such a point below the plane at its entry, or beyond its initial depth [voxels].
-constexpr float allowedDepth = 0.1f;
+// Maximum depth of a surface point below the plane where its test point enters, and of a point that starts inside
+// beyond its initial depth [voxels].
+constexpr float maxDeepening = 0.1f, maxDepth = testDepth + maxDeepening;
 // A stopped body goes back by this much at most from where the test point entered [voxels]. An oblique path touches far
 // before it enters. Where the surface bends in between, the next step's contacts would not see what the body met, and
 // stop it in the same place again.
@@ -109,11 +110,13 @@ class PointSweep {
   private:
     void follow(const RoundedPoint& rounded) {
         const auto& [point, outward, radius] = rounded;
-        const float inward = testDepth * voxel_, smaller = std::max(scale_ * radius - inward, 0.f);
-        const glm::vec3 inner = point - (inward - scale_ * radius + smaller) / scale_ * outward;
+        const float smaller = std::max(scale_ * radius - testDepth * voxel_, 0.f), shrunk = scale_ * radius - smaller,
+                    inward = testDepth * voxel_ - shrunk;
+        const glm::vec3 inner = point - inward / scale_ * outward;
         glm::vec3 from = transforms_.front()(inner), offset(0);
         // a point that starts inside may move on at its depth
-        if (surface_.entry(from, from, smaller)) {
+        const bool startsInside = surface_.entry(from, from, smaller).has_value();
+        if (startsInside) {
             const auto out = surface_.depenetration(from, smaller);
             if (!out) return;
             offset = *out;
@@ -127,13 +130,15 @@ class PointSweep {
                 const auto depth = [&](const glm::vec3& at) {
                     return glm::dot(entered->position - at, entered->normal) + smaller;
                 };
-                const float before = depth(from), after = depth(to), deepest = allowedDepth * voxel_;
-                if (after > deepest) {
-                    // back to the contact of its own surface
-                    const glm::vec3 out = transforms_[i].rotated(outward);
-                    const float touching = std::min(inward * glm::dot(out, entered->normal), 0.f);
+                const float before = depth(from), after = depth(to);
+                // where the point itself touches
+                const float facing = glm::dot(transforms_[i].rotated(outward), entered->normal),
+                            touching = std::min(inward * facing, 0.f) - shrunk;
+                if (after > (startsInside ? maxDeepening * voxel_ : maxDepth * voxel_ + touching)) {
                     const float descent = after - before, back = maxReturn * voxel_ / glm::distance(from, to);
-                    const float part = std::max(touching - before, -before - back * descent) / descent;
+                    float part = std::max(touching - before, -before - back * descent) / descent;
+                    // without a way back, the body moves on to the entry, where contacts see what it meets
+                    if (i == 0 && part < 0) part = std::max(-before / descent, 0.f);
                     const float time = transforms_[i].time + part * (transforms_[i + 1].time - transforms_[i].time);
                     first_ = {std::clamp(time, 0.f, first_.time), entered->position - offset, entered->normal};
                     return;

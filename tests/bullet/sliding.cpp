@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <glm/trigonometric.hpp>
 #include <utility>
 #include <vector>
 
 #include <bilayer/integration/bullet/extensions.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
+#include "demos/shared/waves.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -247,10 +249,30 @@ Slide slide(btCollisionShape& ground, btCollisionShape& shape, float height, flo
     return slide;
 }
 
+/// Calls found(place on the ground, place on the body, normal away from the ground) for each contact.
+template <class Found>
+void forContactsOn(const btRigidBody& ground, btDispatcher& dispatcher, Found&& found) {
+    for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
+        const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(m);
+        const bool isFirst = manifold.getBody0() == &ground;
+        if (!isFirst && manifold.getBody1() != &ground) continue;
+        for (int i = 0; i < manifold.getNumContacts(); ++i) {
+            const btManifoldPoint& point = manifold.getContactPoint(i);
+            const btVector3 onA = point.getPositionWorldOnA(), onB = point.getPositionWorldOnB();
+            const btVector3 alongNormal = onB + point.getDistance() * point.m_normalWorldOnB;
+            if (isFirst)
+                found(onA, alongNormal, -point.m_normalWorldOnB);
+            else
+                found(onB, onA, point.m_normalWorldOnB);
+        }
+    }
+}
+
 }  // namespace
 
 TEST_CASE("A body that slides over high waves is not stopped at an edge of the ground") {
-    const auto [cell, steps] = GENERATE(std::pair(0.25f, 60.f), std::pair(0.25f, 240.f), std::pair(0.6f, 240.f));
+    const auto [cell, steps] = GENERATE(std::pair(0.15f, 60.f), std::pair(0.25f, 60.f), std::pair(0.25f, 240.f),
+                                        std::pair(0.6f, 60.f), std::pair(0.6f, 240.f));
     const unsigned seed = test::seed();
     CAPTURE(cell, steps, seed);
     Random random(seed);
@@ -272,4 +294,38 @@ TEST_CASE("A body that slides over smooth high waves keeps its speed without fri
     Shape block(exactBox({0.3f, 0.3f, 0.15f}, 0.0125f));
     const Slide result = slide(*ground.shape, block, 0.15f, 0.13f, steps, 2);
     CHECK(result.end == Approx(result.start).margin(0.04f * result.kinetic));  // 2 % of the speed
+}
+
+TEST_CASE("Contacts with waves have normals of the triangles around them, however far a body rotates in a step") {
+    const unsigned seed = test::seed();
+    Random random(seed);
+    Shape block(exactBox({0.3f, 0.3f, 0.15f}, 0.0125f)), ball(exactSphere(0.25f, 0.0125f));
+    for (int i = 0; i < 8; ++i) {
+        const float height = float(random(0.05, 0.1)), cell = float(random(0.15, 1.5));
+        CAPTURE(seed, i, height, cell);
+        const demo::Waves waves({height, cell});
+        const auto shape = waves.shape();
+        World world;
+        const btRigidBody* ground = world.add(*shape, 0, {0, 0, 0});
+        for (int k = 0; k < 6; ++k) {
+            const btVector3 place(float(random(-6, -5)), float(k) - 2.5f, height + 0.25f);
+            btRigidBody* body = world.add(k < 4 ? block : ball, 1, place);
+            body->setFriction(k % 2 ? 0 : 1);
+            body->setLinearVelocity({float(random(1, 3)), 0, 0});
+        }
+        int oblique = 0;
+        for (int step = 0; step < 120; ++step) {
+            world.dynamics.stepSimulation(1 / 60.f, 0);
+            forContactsOn(*ground, world.dispatcher,
+                          [&](const btVector3& onGround, const btVector3& onBody, const btVector3& normal) {
+                              const auto angleAt = [&](const btVector3& place) {
+                                  const glm::dvec3 at(place.x(), place.y(), place.z()),
+                                      up(normal.x(), normal.y(), normal.z());
+                                  return waves.angleToNormals(at, up, 0.25 * 0.0125);
+                              };
+                              oblique += std::min(angleAt(onGround), angleAt(onBody)) > glm::radians(5.0);
+                          });
+        }
+        CHECK(oblique == 0);
+    }
 }

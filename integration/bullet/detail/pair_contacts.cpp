@@ -22,6 +22,9 @@ namespace {
 
 // Tolerance of equal distances of triangles from a contact [voxels].
 constexpr float sameDistance = 1e-3f;
+// A contact is not predicted to move on to a triangle whose normal is farther from its own than this, relative to the
+// triangle that it is on: 3 degrees (cosine).
+constexpr float minPredictedCosine = 0.9986f;
 
 bool hasTriangles(const btCollisionShape& shape) {
     return shape.isConcave() && !isField(shape) && shape.getShapeType() != STATIC_PLANE_PROXYTYPE;
@@ -144,12 +147,12 @@ void Pair::finish(const Side& a, const Side& b) {
     for (const ContactPatch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i)
             details_.push_back({predictions.predict(patch.contacts[i]), std::nullopt});
-    if (hasTriangles(*a.shape)) nameTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());
+    if (hasTriangles(*a.shape)) useTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());
     isReady_ = true;
     sampled_ = 0;
 }
 
-void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field) {
+void Pair::useTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field) {
     std::vector<MeshPlace> places;
     for (const ContactPatch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i) {
@@ -157,10 +160,20 @@ void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transfor
             places.push_back(
                 {toBullet(contact.position + contact.distance * contact.normal), toBullet(contact.normal)});
         }
+    const std::size_t count = places.size();
+    for (const ContactDetails& details : details_)
+        if (const auto& predicted = details.prediction)
+            places.push_back({toBullet(predicted->onA), toBullet(predicted->normal)});
     const Field& of = field.collider.field();
     const float voxel = field.scale * of.voxelSize(), reach = voxel + field.scale * of.interiorWidth();
     const auto triangles = trianglesAt(mesh, transform, places, reach, sameDistance * voxel);
-    for (std::size_t i = 0; i < details_.size(); ++i) details_[i].triangle = triangles[i];
+    for (std::size_t i = 0, atEnd = count; i < count; ++i) {
+        const auto& here = triangles[i];
+        if (here) details_[i].triangle = here->id;
+        if (!details_[i].prediction) continue;
+        const auto& there = triangles[atEnd++];
+        if (!there || there->cosine < minPredictedCosine * (here ? here->cosine : 1)) details_[i].prediction.reset();
+    }
 }
 
 ContactShape Pair::otherShape(const btCollisionShape& shape) {

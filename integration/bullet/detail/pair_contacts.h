@@ -76,7 +76,8 @@ class Pair {
     void find(const Side& a, const Side& b, float margin, bool exact);
     ContactShape otherShape(const btCollisionShape& shape);
     void finish(const Side& a, const Side& b);
-    void nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field);
+    /// Names the triangles of the contacts, and drops predictions that leave them.
+    void useTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field);
 
     Manifolds manifolds_;
     DispatchStatistics& statistics_;

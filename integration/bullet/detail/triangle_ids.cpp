@@ -35,18 +35,17 @@ class Search {
         const float cosine = length > 0 ? std::abs(glm::dot(across, normal_)) / length : 0;
         const bool isNearer = distance < distance_ - tolerance_;
         minDistance_ = std::min(minDistance_, distance);
-        if (found_ && !isNearer && cosine <= cosine_) return;
-        found_ = id;
+        if (found_ && !isNearer && cosine <= found_->cosine) return;
+        found_ = {id, cosine};
         distance_ = distance;
-        cosine_ = cosine;
     }
-    std::optional<TriangleId> found() const { return found_; }
+    std::optional<NearTriangle> found() const { return found_; }
 
   private:
     glm::vec3 place_, normal_;
     float minDistance_, tolerance_;
-    std::optional<TriangleId> found_;
-    float distance_ = 0, cosine_ = 0;  ///< of the result
+    std::optional<NearTriangle> found_;
+    float distance_ = 0;  ///< of the result
 };
 
 struct Searches : btTriangleCallback {
@@ -59,8 +58,8 @@ struct Searches : btTriangleCallback {
 
 }  // namespace
 
-std::vector<std::optional<TriangleId>> trianglesAt(const btConcaveShape& mesh, const btTransform& transform,
-                                                   std::span<const MeshPlace> places, float reach, float tolerance) {
+std::vector<std::optional<NearTriangle>> trianglesAt(const btConcaveShape& mesh, const btTransform& transform,
+                                                     std::span<const MeshPlace> places, float reach, float tolerance) {
     if (places.empty()) return {};
     Searches searches;
     const btTransform inMesh = transform.inverse();
@@ -73,9 +72,9 @@ std::vector<std::optional<TriangleId>> trianglesAt(const btConcaveShape& mesh, c
     }
     const btVector3 by(reach, reach, reach);
     mesh.processAllTriangles(&searches, lower - by, upper + by);
-    std::vector<std::optional<TriangleId>> ids;
-    for (const Search& search : searches.all) ids.push_back(search.found());
-    return ids;
+    std::vector<std::optional<NearTriangle>> near;
+    for (const Search& search : searches.all) near.push_back(search.found());
+    return near;
 }
 
 }  // namespace bilayer::bullet::detail

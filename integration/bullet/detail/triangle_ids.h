@@ -17,6 +17,12 @@ struct TriangleId {
     int part, index;
 };
 
+/// A triangle next to a point.
+struct NearTriangle {
+    TriangleId id;
+    float cosine;  ///< between the normals of the triangle and of the contact, of either sign
+};
+
 /// A point on a mesh, in the world.
 struct MeshPlace {
     btVector3 position;  ///< [m]
@@ -27,7 +33,7 @@ struct MeshPlace {
 /// normal is nearest to the contact's.
 /// @param reach      maximum distance of a triangle from its point; none is returned beyond [m]
 /// @param tolerance  distances that differ by less are equal [m]
-std::vector<std::optional<TriangleId>> trianglesAt(const btConcaveShape& mesh, const btTransform& transform,
-                                                   std::span<const MeshPlace> places, float reach, float tolerance);
+std::vector<std::optional<NearTriangle>> trianglesAt(const btConcaveShape& mesh, const btTransform& transform,
+                                                     std::span<const MeshPlace> places, float reach, float tolerance);
 
 }  // namespace bilayer::bullet::detail
