@@ -14,8 +14,6 @@
 namespace bilayer::detail {
 namespace {
 
-/// In units of the slack: distance in front of and behind a triangle at which labels are asked for.
-constexpr double stepOff = 2;
 /// The label of patches without area, which have no sides.
 constexpr int withoutArea = 1;
 
@@ -73,7 +71,7 @@ void SurfacePieces::findPatches() {
 
 void SurfacePieces::label(const LabelOf& labelOf) {
     const auto labelAt = [&](const glm::dvec3& point, const glm::dvec3& normal) {
-        const glm::dvec3 step = stepOff * slack_ * normal;
+        const glm::dvec3 step = slack_ * normal;
         return labelOf(point + step, point - step);
     };
     forAll(patches_.size(), progress_, [&](std::size_t p) {

@@ -12,11 +12,11 @@ namespace {
 
 /// Surfaces closer than this count as touching, relative to the max coordinate: one unit in the last place of a float.
 /// Walls between solids that lie flush but for rounding are then removed.
-constexpr double touching = 1.2e-7;
+constexpr double touching = 2.5e-7;
 /// The same where surfaces lie exactly where their floats say. Pieces of two surfaces may disagree on whether they
 /// touch if the surfaces are nearly this close. Below, winding numbers on the two sides of slivers would be rounding
 /// noise.
-constexpr double coincident = 1e-12;
+constexpr double coincident = 2e-12;
 
 }  // namespace
 
