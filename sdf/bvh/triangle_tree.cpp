@@ -4,6 +4,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -43,42 +44,86 @@ glm::dvec3 centroid(const Mesh& mesh, unsigned triangle) {
     return (glm::dvec3(mesh.points[t.x]) + glm::dvec3(mesh.points[t.y]) + glm::dvec3(mesh.points[t.z])) / 3.0;
 }
 
-// A line, and a plane perpendicular to it onto which triangles are projected.
-struct LineFrame {
-    glm::dvec3 origin, direction, inverse, u, v;
-
-    LineFrame(const glm::dvec3& from, const glm::dvec3& along) : origin(from), direction(along), inverse(1.0 / along) {
+// The part of a line beyond a position, and a plane perpendicular to it onto which triangles are projected.
+class LineSearch {
+  public:
+    LineSearch(const glm::dvec3& from, const glm::dvec3& along, double first, double slack)
+        : origin_(from), direction_(along), inverse_(1.0 / along), first_(first), slack_(slack) {
         const glm::dvec3 helper = std::abs(along.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
-        u = glm::normalize(glm::cross(along, helper));
-        v = glm::cross(along, u);
+        u_ = glm::normalize(glm::cross(along, helper));
+        v_ = glm::cross(along, u_);
     }
 
-    bool meets(const Bounds& box, double slack) const {
-        double first = -std::numeric_limits<double>::infinity(), last = -first;
-        for (int axis = 0; axis < 3; ++axis) {
-            const double a = (double(box.lower[axis]) - slack - origin[axis]) * inverse[axis];
-            const double b = (double(box.upper[axis]) + slack - origin[axis]) * inverse[axis];
-            first = std::max(first, std::min(a, b));
-            last = std::min(last, std::max(a, b));
+    // Returns a bit for each box of a group that the line meets.
+    unsigned met(const BoxGroup& group) const {
+        double enter[treeWidth], exit[treeWidth];
+        std::fill_n(enter, treeWidth, first_);
+        std::fill_n(exit, treeWidth, std::numeric_limits<double>::infinity());
+        for (int axis = 0; axis < 3; ++axis)
+            for (int i = 0; i < treeWidth; ++i) {
+                const double a = (double(group.lower[axis][i]) - slack_ - origin_[axis]) * inverse_[axis];
+                const double b = (double(group.upper[axis][i]) + slack_ - origin_[axis]) * inverse_[axis];
+                const double low = a < b ? a : b, high = a < b ? b : a;
+                enter[i] = enter[i] < low ? low : enter[i];
+                exit[i] = exit[i] > high ? high : exit[i];
+            }
+        unsigned bits = 0;
+        for (int i = 0; i < treeWidth; ++i)
+            if (enter[i] <= exit[i] && group.lower[0][i] <= group.upper[0][i]) bits |= 1u << i;
+        return bits;
+    }
+
+    // Adds the crossings of a leaf's triangles. Returns false if the line hits an edge exactly.
+    bool add(const TriangleLeaf& leaf, std::size_t count, std::vector<Crossing>& found) const {
+        Lanes u[3], v[3], area[3];
+        for (int corner = 0; corner < 3; ++corner) {
+            project(leaf.corners[corner], u_, u[corner]);
+            project(leaf.corners[corner], v_, v[corner]);
         }
-        return first <= last;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::size_t a = (k + 1) % 3, b = (k + 2) % 3;
+            // twice the signed area of the origin and the edge opposite to corner k; the reversed edge has exactly the
+            // negative value
+            for (int i = 0; i < treeWidth; ++i) area[k].at[i] = u[a].at[i] * v[b].at[i] - v[a].at[i] * u[b].at[i];
+        }
+        bool clear = true;
+        for (std::size_t i = 0; i < count; ++i) {
+            const double bc = area[0].at[i], ca = area[1].at[i], ab = area[2].at[i];
+            const double low = std::min({bc, ca, ab}), high = std::max({bc, ca, ab});
+            if (low < 0 && high > 0) continue;
+            if (low > 0 || high < 0)
+                addCrossing(leaf, i, {bc, ca, ab}, found);
+            else
+                clear = false;
+        }
+        return clear;
     }
 
-    // Returns twice the signed area of the projected edge and the origin. The reversed edge has exactly the negative
-    // value.
-    double twiceArea(const glm::dvec3& a, const glm::dvec3& b) const {
-        return glm::dot(a, u) * glm::dot(b, v) - glm::dot(a, v) * glm::dot(b, u);
+  private:
+    struct Lanes {
+        double at[treeWidth];
+    };
+
+    void project(const float (&corner)[3][treeWidth], const glm::dvec3& axis, Lanes& to) const {
+        for (int i = 0; i < treeWidth; ++i)
+            to.at[i] = (double(corner[0][i]) - origin_.x) * axis.x + (double(corner[1][i]) - origin_.y) * axis.y +
+                       (double(corner[2][i]) - origin_.z) * axis.z;
     }
 
-    // Returns 0 for a miss, otherwise the sign of the crossing; `along` receives its position.
-    int cross(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double& along) const {
-        const double bc = twiceArea(b, c), ca = twiceArea(c, a), ab = twiceArea(a, b);
-        const bool front = bc > 0 && ca > 0 && ab > 0, back = bc < 0 && ca < 0 && ab < 0;
-        if (!front && !back) return 0;
-        const double sum = bc + ca + ab;
-        along = (bc * glm::dot(a, direction) + ca * glm::dot(b, direction) + ab * glm::dot(c, direction)) / sum;
-        return front ? 1 : -1;
+    void addCrossing(const TriangleLeaf& leaf, std::size_t i, const glm::dvec3& weights,
+                     std::vector<Crossing>& found) const {
+        double sum = 0, along = 0;
+        for (int k = 0; k < 3; ++k) {
+            const auto& corner = leaf.corners[k];
+            sum += weights[k];
+            along += weights[k] * glm::dot(glm::dvec3(corner[0][i], corner[1][i], corner[2][i]) - origin_, direction_);
+        }
+        along /= sum;
+        if (along > first_) found.push_back({leaf.triangles[i], along, sum > 0 ? 1 : -1});
     }
+
+    glm::dvec3 origin_, direction_, inverse_, u_, v_;
+    double first_, slack_;
 };
 
 // Returns the parts that a ray from the point crosses an odd number of times, in order.
@@ -132,20 +177,23 @@ TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh) {
                 largest_ = std::max({largest_, std::abs(root.lower[k][i]), std::abs(root.upper[k][i])});
 }
 
-void TriangleTree::crossings(const glm::dvec3& origin, const glm::dvec3& direction,
-                             std::vector<Crossing>& found) const {
-    const LineFrame line(origin, direction);
-    const double slack = roundingOfBoxes * double(largest_);
+bool TriangleTree::crossings(const glm::dvec3& origin, const glm::dvec3& direction, std::vector<Crossing>& found,
+                             double first) const {
     found.clear();
-    descend([&](const Bounds& box) { return line.meets(box, slack); },
-            [&](unsigned i) {
-                const glm::uvec3& t = mesh_.triangles[i];
-                Crossing crossing{i, 0, 0};
-                crossing.sign =
-                    line.cross(glm::dvec3(mesh_.points[t.x]) - origin, glm::dvec3(mesh_.points[t.y]) - origin,
-                               glm::dvec3(mesh_.points[t.z]) - origin, crossing.along);
-                if (crossing.sign) found.push_back(crossing);
-            });
+    if (boxes_.leafCount == 0) return true;
+    const LineSearch line(origin, direction, first, roundingOfBoxes * double(largest_));
+    bool clear = true;
+    const auto visit = [&](const auto& self, std::uint32_t node) -> void {
+        if (boxes_.isLeaf(node)) {
+            clear &= line.add(leaves_[node], leafSize(node), found);
+            return;
+        }
+        const BoxGroup& group = boxes_.group(node);
+        for (unsigned bits = line.met(group); bits != 0; bits &= bits - 1)
+            self(self, group.firstChild + std::uint32_t(std::countr_zero(bits)));
+    };
+    visit(visit, boxes_.root());
+    return clear;
 }
 
 std::vector<glm::dvec3> spreadDirections(std::size_t count) {

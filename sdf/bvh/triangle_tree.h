@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/common.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -43,9 +44,12 @@ class TriangleTree {
         if (boxes_.leafCount > 0) descend(boxes_.root(), meets, visit);
     }
 
-    /// Finds all intersections of a line with triangles, in both directions and in no particular order. The line
-    /// crosses an edge that two triangles share only once, unless it hits the edge exactly.
-    void crossings(const glm::dvec3& origin, const glm::dvec3& direction, std::vector<Crossing>& found) const;
+    /// Finds all intersections of a line with triangles, in no particular order. The line crosses an edge that two
+    /// triangles share only once, unless it hits the edge exactly. Such intersections are left out.
+    /// @param first  intersections beyond this line parameter; by default, of the line in both directions
+    /// Returns false if the line may hit an edge exactly.
+    bool crossings(const glm::dvec3& origin, const glm::dvec3& direction, std::vector<Crossing>& found,
+                   double first = -std::numeric_limits<double>::infinity()) const;
 
     Bounds boxOf(unsigned triangle) const {
         Bounds box;

@@ -9,13 +9,10 @@
 #include <utility>
 
 #include "sdf/base/progress.h"
-#include "sdf/bvh/triangle_tree.h"
 
 namespace bilayer::detail {
 namespace {
 
-/// In units of the slack: distance in front of and behind a triangle at which labels are asked for.
-constexpr double stepOff = 2;
 /// The label of patches without area, which have no sides.
 constexpr int withoutArea = 1;
 
@@ -39,15 +36,25 @@ SurfacePieces::SurfacePieces(const Mesh& mesh, double slack, Progress* progress)
     : mesh_(mesh),
       progress_(progress),
       topology_(mesh, progress),
+      tree_(mesh, progress),
       slack_(slack * largestCoordinate(mesh)),
       contacts_(mesh.triangles.size()),
       patchLabels_(mesh.triangles.size(), 0),
       cuts_(mesh.triangles.size()) {
-    const TriangleTree tree(mesh, progress);
-    const TriangleContacts contacts(mesh, topology_, tree, slack_);
+    const TriangleContacts contacts(mesh, topology_, tree_, slack_);
     forAll(contacts_.size(), progress, [&](std::size_t i) { contacts_[i] = contacts.within(unsigned(i)); });
     touched_ = std::any_of(contacts_.begin(), contacts_.end(), [](const auto& segments) { return !segments.empty(); });
     findPatches();
+}
+
+bool SurfacePieces::isClosed() const {
+    bool closed = true;
+    topology_.forEachEdge([&](std::span<const EdgeUse> uses) {
+        int net = 0;
+        for (const EdgeUse& use : uses) net += use.direction();
+        closed &= net == 0;
+    });
+    return closed;
 }
 
 // Patches are triangles connected by edges of two triangles, without contacts. A patch is represented by its largest
@@ -72,9 +79,9 @@ void SurfacePieces::findPatches() {
 }
 
 void SurfacePieces::label(const LabelOf& labelOf) {
-    const auto labelAt = [&](const glm::dvec3& point, const glm::dvec3& normal) {
-        const glm::dvec3 step = stepOff * slack_ * normal;
-        return labelOf(point + step, point - step);
+    const SurfaceSides sides(mesh_, tree_, isClosed(), progress_);
+    const auto labelAt = [&](const glm::dvec3& place, const glm::dvec3& normal) {
+        return labelOf(sides.at(place, slack_ * normal));
     };
     forAll(patches_.size(), progress_, [&](std::size_t p) {
         const DoubleTriangle largest = face(patches_[p]);

@@ -13,6 +13,8 @@
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/bvh/triangle_tree.h"
+#include "sdf/mesh/surface_sides.h"
 #include "sdf/mesh/topology.h"
 #include "sdf/mesh/triangle_contacts.h"
 #include "sdf/mesh/triangle_cut.h"
@@ -29,9 +31,9 @@ struct LabelledMesh {
 
 class SurfacePieces {
   public:
-    /// Returns the label of a place on the surface, from points in front of it and behind it. Called by several
+    /// Returns the label of a place on the surface from the winding numbers on its two sides. Called by several
     /// threads. Label 0 removes the place.
-    using LabelOf = std::function<int(const glm::dvec3& front, const glm::dvec3& behind)>;
+    using LabelOf = std::function<int(const SideNumbers& sides)>;
 
     /// Finds the contacts. Keeps a reference to the mesh, which must be valid.
     /// @param slack     surfaces closer than this count as touching, relative to the max coordinate; above the rounding
@@ -56,6 +58,7 @@ class SurfacePieces {
     bool remains(std::size_t triangle) const;
 
   private:
+    bool isClosed() const;
     void findPatches();
     DoubleTriangle face(std::size_t triangle) const { return {mesh_, mesh_.triangles[triangle]}; }
     static void append(const LabelledPiece& piece, LabelledMesh& to);
@@ -63,6 +66,7 @@ class SurfacePieces {
     const Mesh& mesh_;
     Progress* progress_;
     const Topology topology_;
+    const TriangleTree tree_;
     const double slack_;
     bool touched_ = false;
     std::vector<std::vector<Segment>> contacts_;    // for each triangle

@@ -9,31 +9,69 @@
 namespace bilayer::detail {
 namespace {
 
-/// In units of the slack: max length of a contact that neighbours with a common vertex or edge have next to it.
-constexpr double shortContact = 4;
+/// In units of the slack: narrower contact areas count as one line, and neighbours may touch so far from a common
+/// vertex.
+constexpr double negligible = 4;
 
 /// Tests whether a box overlaps both a face's bounding box and its plane, with the slack as a margin.
 class TriangleOverlap {
   public:
     TriangleOverlap(const Bounds& own, const DoubleTriangle& face, double slack)
-        : box_{own.lower - float(slack), own.upper + float(slack)},
+        : lower_(glm::dvec3(own.lower) - slack),
+          upper_(glm::dvec3(own.upper) + slack),
           normal_(face.normal),
           away_(glm::abs(face.normal)),
           at_(2 * glm::dot(face.normal, face.corners[0])),
           slack_(2 * slack) {}
 
     bool operator()(const Bounds& other) const {
-        for (int axis = 0; axis < 3; ++axis)
-            if (other.lower[axis] > box_.upper[axis] || box_.lower[axis] > other.upper[axis]) return false;
         const glm::dvec3 lower(other.lower), upper(other.upper);
+        for (int axis = 0; axis < 3; ++axis)
+            if (lower[axis] > upper_[axis] || lower_[axis] > upper[axis]) return false;
         return std::abs(glm::dot(normal_, lower + upper) - at_) <= glm::dot(away_, upper - lower) + slack_;
     }
 
   private:
-    const Bounds box_;
+    const glm::dvec3 lower_, upper_;
     const glm::dvec3 normal_, away_;
     const double at_, slack_;  // both doubled
 };
+
+/// A point on a face's plane, and the height from which it was projected.
+struct ProjectedPoint {
+    glm::dvec3 at;
+    double height;
+};
+
+using ProjectedPolygon = std::vector<ProjectedPoint>;
+
+ProjectedPoint atHeight(const ProjectedPoint& a, const ProjectedPoint& b, double height) {
+    return {a.at + (height - a.height) / (b.height - a.height) * (b.at - a.at), height};
+}
+
+/// Returns the part of a convex polygon on one side of a height: above it (1) or below it (-1).
+ProjectedPolygon clipped(const ProjectedPolygon& polygon, double height, double side) {
+    ProjectedPolygon part;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+        const ProjectedPoint &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+        const double atA = side * (a.height - height), atB = side * (b.height - height);
+        if (atA >= 0) part.push_back(a);
+        if (atA * atB < 0) part.push_back(atHeight(a, b, height));
+    }
+    return part;
+}
+
+std::vector<glm::dvec3> pointsOf(const ProjectedPolygon& polygon) {
+    std::vector<glm::dvec3> points;
+    for (const ProjectedPoint& p : polygon) points.push_back(p.at);
+    return points;
+}
+
+std::vector<Segment> outline(const std::vector<glm::dvec3>& points) {
+    std::vector<Segment> edges;
+    for (std::size_t i = 0; i < points.size(); ++i) edges.push_back({points[i], points[(i + 1) % points.size()]});
+    return edges;
+}
 
 Segment farthest(const std::vector<glm::dvec3>& points) {
     Segment best{points[0], points[1]};
@@ -41,6 +79,37 @@ Segment farthest(const std::vector<glm::dvec3>& points) {
         for (std::size_t k = 0; k < i; ++k)
             if (glm::length(points[i] - points[k]) > glm::length(best.to - best.from)) best = {points[i], points[k]};
     return best;
+}
+
+bool isNarrow(const std::vector<glm::dvec3>& points, const glm::dvec3& normal, double width) {
+    const Segment longest = farthest(points);
+    const glm::dvec3 along = longest.to - longest.from;
+    if (!(glm::length(along) > width)) return true;
+    const glm::dvec3 across = glm::normalize(glm::cross(normal, along));
+    double low = 0, high = 0;
+    for (const glm::dvec3& p : points) {
+        const double to = glm::dot(across, p - longest.from);
+        low = std::min(low, to);
+        high = std::max(high, to);
+    }
+    return high - low <= width;
+}
+
+// Returns the outline of the part of a triangle within the slack of a plane. If the triangle is so steep that this part
+// is narrow, the outline is one segment: where the triangle meets the plane, if it does.
+std::vector<Segment> contacts(const ProjectedPolygon& triangle, const glm::dvec3& normal, double slack) {
+    const ProjectedPolygon close = clipped(clipped(triangle, -slack, 1), slack, -1);
+    if (close.size() < 2) return {};
+    const std::vector<glm::dvec3> points = pointsOf(close);
+    if (!isNarrow(points, normal, negligible * slack)) return outline(points);
+    std::vector<glm::dvec3> line;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const ProjectedPoint &a = triangle[i], &b = triangle[(i + 1) % 3];
+        const bool aTouches = std::abs(a.height) <= slack, bTouches = std::abs(b.height) <= slack;
+        if (aTouches) line.push_back(a.at);
+        if (a.height * b.height < 0 && !(aTouches && bTouches)) line.push_back(atHeight(a, b, 0).at);
+    }
+    return {farthest(line.size() < 2 ? points : line)};
 }
 
 }  // namespace
@@ -60,31 +129,15 @@ void TriangleContacts::add(unsigned triangle, const DoubleTriangle& face, unsign
     const glm::uvec3& t = mesh_.triangles[other];
     const TriangleCorners corners{glm::dvec3(mesh_.points[t.x]), glm::dvec3(mesh_.points[t.y]),
                                   glm::dvec3(mesh_.points[t.z])};
-    const CornerHeights heights{face.height(corners[0]), face.height(corners[1]), face.height(corners[2])};
-    const auto [lowest, highest] = std::minmax({heights[0], heights[1], heights[2]});
-    if (lowest > slack_ || highest < -slack_) return;
-    for (Segment segment : traces(face, corners, heights)) {
+    ProjectedPolygon projected;
+    for (const glm::dvec3& p : corners) projected.push_back({face.onPlane(p), face.height(p)});
+    for (const Segment& segment : contacts(projected, face.normal, slack_)) {
+        if (!(glm::length(segment.to - segment.from) > slack_)) continue;
         if (alongSharedEdge(triangle, other, face, segment)) continue;
-        if (!clip(segment, face.polygon(), face.normal, slack_)) continue;
-        if (glm::length(segment.to - segment.from) > shortContact * slack_) found.push_back(segment);
+        Segment within = segment;
+        if (!clip(within, face.polygon(), face.normal, slack_)) continue;
+        if (!atSharedVertex(triangle, other, face, within)) found.push_back(segment);
     }
-}
-
-// Returns the intersection of a triangle with a face's plane: nothing, a segment, or all three edges.
-std::vector<Segment> TriangleContacts::traces(const DoubleTriangle& face, const TriangleCorners& corners,
-                                              const CornerHeights& heights) const {
-    std::vector<Segment> edges;
-    std::vector<glm::dvec3> points;
-    for (std::size_t i = 0; i < 3; ++i) {
-        const std::size_t k = (i + 1) % 3;
-        const bool here = std::abs(heights[i]) <= slack_, there = std::abs(heights[k]) <= slack_;
-        if (here) points.push_back(face.onPlane(corners[i]));
-        if (here && there) edges.push_back({face.onPlane(corners[i]), face.onPlane(corners[k])});
-        if (heights[i] * heights[k] < 0 && !(here && there))
-            points.push_back(corners[i] + heights[i] / (heights[i] - heights[k]) * (corners[k] - corners[i]));
-    }
-    if (edges.size() == 3 || points.size() < 2) return edges;
-    return {farthest(points)};
 }
 
 bool TriangleContacts::alongSharedEdge(unsigned triangle, unsigned other, const DoubleTriangle& face,
@@ -98,6 +151,17 @@ bool TriangleContacts::alongSharedEdge(unsigned triangle, unsigned other, const 
         if (std::max(std::abs(glm::dot(across, segment.from - from)), std::abs(glm::dot(across, segment.to - from))) <=
             slack_)
             return true;
+    }
+    return false;
+}
+
+bool TriangleContacts::atSharedVertex(unsigned triangle, unsigned other, const DoubleTriangle& face,
+                                      const Segment& segment) const {
+    const glm::uvec3 &a = topology_.triangles[triangle], &b = topology_.triangles[other];
+    for (int i = 0; i < 3; ++i) {
+        if (a[i] != b.x && a[i] != b.y && a[i] != b.z) continue;
+        const glm::dvec3& at = face.corners[std::size_t(i)];
+        if (std::max(glm::length(segment.from - at), glm::length(segment.to - at)) <= negligible * slack_) return true;
     }
     return false;
 }

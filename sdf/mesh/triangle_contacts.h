@@ -3,7 +3,6 @@
 // Tested by tests/sdf/unite.cpp through unite().
 #pragma once
 
-#include <array>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -42,16 +41,14 @@ class TriangleContacts {
     TriangleContacts(const Mesh& mesh, const Topology& topology, const TriangleTree& tree, double slack)
         : mesh_(mesh), topology_(topology), tree_(tree), slack_(slack) {}
 
-    /// Returns the contact segments within a triangle, except for edges and vertices that it shares with neighbours.
+    /// Returns the contact segments that reach into a triangle, except for edges and vertices that it shares with
+    /// neighbours. They lie in its plane, and may extend beyond it.
     std::vector<Segment> within(unsigned triangle) const;
 
   private:
-    using CornerHeights = std::array<double, 3>;
-
     void add(unsigned triangle, const DoubleTriangle& face, unsigned other, std::vector<Segment>& found) const;
-    std::vector<Segment> traces(const DoubleTriangle& face, const TriangleCorners& corners,
-                                const CornerHeights& heights) const;
     bool alongSharedEdge(unsigned triangle, unsigned other, const DoubleTriangle& face, const Segment& segment) const;
+    bool atSharedVertex(unsigned triangle, unsigned other, const DoubleTriangle& face, const Segment& segment) const;
 
     const Mesh& mesh_;
     const Topology& topology_;

@@ -18,6 +18,9 @@ namespace {
 constexpr std::size_t fewSegments = 8;
 /// Such a line is useful if neither side has more than this share of the segments.
 constexpr double usefulPart = 0.75;
+/// In units of the slack: parts of segments closer to a line lie on it. Much less than 1, so that segments also cut
+/// pieces that are hardly wider than the slack.
+constexpr double onLine = 1.0 / 1024;
 
 /// A line in the polygon's plane, given by a point and the normal direction within the plane.
 struct CuttingLine {
@@ -48,18 +51,25 @@ Halves<Polygon> split(const Polygon& polygon, const CuttingLine& line) {
     return halves;
 }
 
-/// Splits segments. Segments along the line, and parts shorter than the slack, are on neither side.
-Halves<std::vector<Segment>> split(const std::vector<Segment>& segments, const CuttingLine& line, double slack) {
-    Halves<std::vector<Segment>> halves;
-    for (const Segment& s : segments) {
+/// The part of a segment within a polygon, and the line of the whole segment.
+struct Cut {
+    Segment segment;
+    CuttingLine line;
+};
+
+/// Splits segments. Parts along the line are on neither side.
+Halves<std::vector<Cut>> split(const std::vector<Cut>& cuts, const CuttingLine& line, double slack) {
+    Halves<std::vector<Cut>> halves;
+    for (const Cut& cut : cuts) {
+        const Segment& s = cut.segment;
         const double from = line.height(s.from), to = line.height(s.to);
         for (const int side : {0, 1}) {
             const double a = side ? from : -from, b = side ? to : -to;
-            if (std::max(a, b) <= slack) continue;
+            if (std::max(a, b) <= onLine * slack) continue;
             Segment part = s;
             if (a < 0) part.from = crossing(s.from, a, s.to, b);
             if (b < 0) part.to = crossing(s.from, a, s.to, b);
-            if (glm::length(part.to - part.from) > slack) halves[std::size_t(side)].push_back(part);
+            halves[std::size_t(side)].push_back({part, cut.line});
         }
     }
     return halves;
@@ -89,49 +99,56 @@ class Cutter {
     Cutter(const glm::dvec3& normal, double slack, const std::function<int(const glm::dvec3&)>& labelOf)
         : normal_(normal), slack_(slack), labelOf_(labelOf) {}
 
-    Pieces divide(Polygon polygon, std::vector<Segment> segments) const {
-        while (!segments.empty()) {
-            Split halves = splitAcross(polygon, segments);
-            if (!isUseful(halves, segments.size())) {
-                const Segment along = segments.back();
-                segments.pop_back();
-                halves = splitBy({along.from, glm::normalize(glm::cross(normal_, along.to - along.from))}, polygon,
-                                 segments);
+    Pieces divide(const Polygon& polygon, const std::vector<Segment>& segments) const {
+        std::vector<Cut> cuts;
+        for (const Segment& s : segments)
+            if (Segment part = s; clip(part, polygon, normal_, slack_))
+                cuts.push_back({part, {s.from, glm::normalize(glm::cross(normal_, s.to - s.from))}});
+        return divide(polygon, std::move(cuts));
+    }
+
+  private:
+    Pieces divide(Polygon polygon, std::vector<Cut> cuts) const {
+        while (!cuts.empty()) {
+            Split halves = splitAcross(polygon, cuts);
+            if (!isUseful(halves, cuts.size())) {
+                const CuttingLine line = cuts.back().line;
+                cuts.pop_back();
+                halves = splitBy(line, polygon, cuts);
             }
             // a segment along the border divides nothing
             if (halves.thin) continue;
-            return joined(std::move(polygon), divide(std::move(halves.polygons[0]), std::move(halves.segments[0])),
-                          divide(std::move(halves.polygons[1]), std::move(halves.segments[1])));
+            return joined(std::move(polygon), divide(std::move(halves.polygons[0]), std::move(halves.cuts[0])),
+                          divide(std::move(halves.polygons[1]), std::move(halves.cuts[1])));
         }
         return labelled(std::move(polygon));
     }
 
-  private:
     struct Split {
         Halves<Polygon> polygons;
-        Halves<std::vector<Segment>> segments;
+        Halves<std::vector<Cut>> cuts;
         bool thin = true;  // one half is not wider than the slack
     };
 
-    Split splitBy(const CuttingLine& line, const Polygon& polygon, const std::vector<Segment>& segments) const {
-        Split halves{split(polygon, line), split(segments, line, slack_), false};
+    Split splitBy(const CuttingLine& line, const Polygon& polygon, const std::vector<Cut>& cuts) const {
+        Split halves{split(polygon, line), split(cuts, line, slack_), false};
         halves.thin = isThin(halves.polygons[0], line, slack_) || isThin(halves.polygons[1], line, slack_);
         return halves;
     }
 
-    Split splitAcross(const Polygon& polygon, const std::vector<Segment>& segments) const {
-        return segments.size() > fewSegments ? splitBy(middle(segments), polygon, segments) : Split{};
+    Split splitAcross(const Polygon& polygon, const std::vector<Cut>& cuts) const {
+        return cuts.size() > fewSegments ? splitBy(middle(cuts), polygon, cuts) : Split{};
     }
 
     static bool isUseful(const Split& halves, std::size_t segments) {
-        const std::size_t more = std::max(halves.segments[0].size(), halves.segments[1].size());
+        const std::size_t more = std::max(halves.cuts[0].size(), halves.cuts[1].size());
         return !halves.thin && double(more) <= usefulPart * double(segments);
     }
 
     /// Returns a line across the longer side of the segments' bounding box, with half of their midpoints on each side.
-    CuttingLine middle(const std::vector<Segment>& segments) const {
+    CuttingLine middle(const std::vector<Cut>& cuts) const {
         std::vector<glm::dvec3> middles;
-        for (const Segment& s : segments) middles.push_back(0.5 * (s.from + s.to));
+        for (const Cut& cut : cuts) middles.push_back(0.5 * (cut.segment.from + cut.segment.to));
         glm::dvec3 lower = middles[0], upper = middles[0];
         for (const glm::dvec3& p : middles) lower = glm::min(lower, p), upper = glm::max(upper, p);
         const glm::dvec3 size = upper - lower;
@@ -180,9 +197,9 @@ bool clip(Segment& segment, const Polygon& polygon, const glm::dvec3& normal, do
     return true;
 }
 
-std::vector<LabelledPiece> cut(const Polygon& polygon, const glm::dvec3& normal, std::vector<Segment> segments,
+std::vector<LabelledPiece> cut(const Polygon& polygon, const glm::dvec3& normal, const std::vector<Segment>& segments,
                                double slack, const std::function<int(const glm::dvec3& inside)>& labelOf) {
-    return Cutter(normal, slack, labelOf).divide(polygon, std::move(segments));
+    return Cutter(normal, slack, labelOf).divide(polygon, segments);
 }
 
 }  // namespace bilayer::detail

@@ -30,9 +30,9 @@ struct LabelledPiece {
 /// pieces of a split have the same label, they remain one piece: a polygon of one label stays whole. Pieces thinner
 /// than `slack` are merged into their neighbours.
 /// @param normal    the polygon's unit normal
-/// @param segments  in the polygon's plane and inside of it, as clip() returns them
+/// @param segments  in the polygon's plane; their parts outside of the polygon cut nothing
 /// @param labelOf   called with an interior point of each piece
-std::vector<LabelledPiece> cut(const Polygon& polygon, const glm::dvec3& normal, std::vector<Segment> segments,
+std::vector<LabelledPiece> cut(const Polygon& polygon, const glm::dvec3& normal, const std::vector<Segment>& segments,
                                double slack, const std::function<int(const glm::dvec3& inside)>& labelOf);
 
 }  // namespace bilayer::detail

@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <utility>
 
-#include "sdf/bvh/winding_number.h"
 #include "sdf/mesh/surface_pieces.h"
 
 namespace bilayer::detail {
@@ -12,11 +11,11 @@ namespace {
 
 /// Surfaces closer than this count as touching, relative to the max coordinate: one unit in the last place of a float.
 /// Walls between solids that lie flush but for rounding are then removed.
-constexpr double touching = 1.2e-7;
+constexpr double touching = 2.5e-7;
 /// The same where surfaces lie exactly where their floats say. Pieces of two surfaces may disagree on whether they
 /// touch if the surfaces are nearly this close. Below, winding numbers on the two sides of slivers would be rounding
 /// noise.
-constexpr double coincident = 1e-12;
+constexpr double coincident = 2e-12;
 
 }  // namespace
 
@@ -24,11 +23,7 @@ UnionSurface unite(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     SurfacePieces pieces(mesh, touching, progress);
     if (pieces.isSinglePatch()) return {mesh, 0, 0};
-    const WindingNumber winding(mesh, progress);
-    pieces.label([&](const glm::dvec3& front, const glm::dvec3& behind) {
-        const bool buried = winding.isInside(front) && winding.isInside(behind);
-        return buried ? 0 : 1;
-    });
+    pieces.label([](const SideNumbers& sides) { return sides.front > 0 && sides.behind > 0 ? 0 : 1; });
     UnionSurface united{pieces.labelled().mesh, 0, 0};
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
         if (!pieces.remains(i))
@@ -41,10 +36,8 @@ UnionSurface unite(const Mesh& mesh, Progress* progress) {
 LabelledMesh unionBoundary(const Mesh& closed, Progress* progress) {
     validate(closed);
     SurfacePieces pieces(closed, coincident, progress);
-    const WindingNumber winding(closed, progress);
-    pieces.label([&](const glm::dvec3& front, const glm::dvec3& behind) {
-        const int before = winding.nearestInteger(front), after = winding.nearestInteger(behind);
-        return (before > 0) == (after > 0) ? 0 : std::abs(after - before);
+    pieces.label([](const SideNumbers& sides) {
+        return (sides.front > 0) == (sides.behind > 0) ? 0 : std::abs(sides.behind - sides.front);
     });
     return pieces.labelled();
 }
