@@ -207,7 +207,8 @@ def run_openvdb(level_set, mesh, given):
     make = module.FloatGrid.createLevelSetFromPolygons
     options = {f"bilayer: sign='auto', which is {level_set.sign}": {"voxel_size": spacing}}
     if level_set.sign != "normals":
-        options["bilayer: sign='normals'"] = {"voxel_size": spacing, "sign": "normals"}
+        for sign in ("normals", "flood"):
+            options[f"bilayer: sign='{sign}'"] = {"voxel_size": spacing, "sign": sign}
     calls = {"OpenVDB": lambda: make(vertices, triangles=faces, transform=transform, halfWidth=3.0)}
     calls |= {name: lambda chosen=chosen: bilayer.build(mesh, **chosen) for name, chosen in options.items()}
     times, built = in_turn(given.repeats, calls)
@@ -247,7 +248,7 @@ def run(path, given):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("meshes", nargs="+", help="closed meshes")
+    parser.add_argument("meshes", nargs="+", help="mesh files; signs of open ones are checked by winding numbers")
     parser.add_argument("--points", type=int, default=1_000_000, help="query points (default: %(default)s)")
     parser.add_argument("--checked", type=int, default=1000, help="points that are checked (default: %(default)s)")
     parser.add_argument("--samples", type=int, default=1_000_000, help="of the cKDTree (default: %(default)s)")

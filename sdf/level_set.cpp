@@ -89,7 +89,7 @@ void requireLevelSet(const Grids& grids) {
     if (grid.getGridClass() != openvdb::GRID_LEVEL_SET)
         throw std::invalid_argument(fmt::format("grid {} is no level set", quotedWord(grid.getName())));
     if (!grid.hasUniformVoxels() || !grid.transform().isLinear())
-        throw std::invalid_argument(fmt::format("grid {} has voxels that are no cubes", quotedWord(grid.getName())));
+        throw std::invalid_argument(fmt::format("grid {} has voxels that are not cubes", quotedWord(grid.getName())));
     const double h = grid.voxelSize()[0];
     require(h >= minStoredVoxel && h <= maxStoredVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
     requireWidth(grid, "the background", grid.background());

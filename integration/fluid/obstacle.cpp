@@ -3,6 +3,7 @@
 // its faces into the triangles of these, so that neighbours agree on shared faces.
 #include <bilayer/integration/fluid/obstacle.h>
 
+#include <fmt/format.h>
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 
@@ -180,7 +181,8 @@ void check(const SolidOptions& options, const Transform& cells) {
     const float lengths = glm::length(options.velocity.linear) + glm::length(options.velocity.angular);
     if (!std::isfinite(lengths)) throw std::invalid_argument("solid: the velocity is not finite");
     if (!(options.halfWidthVoxels >= minHalfWidth && options.halfWidthVoxels <= maxHalfWidth))
-        throw std::invalid_argument("solid: the half width must be in 3..1000 voxels");
+        throw std::invalid_argument(
+            fmt::format("solid: halfWidthVoxels must be in 3..1000, not {:g}", options.halfWidthVoxels));
 }
 
 // The progress of one of the two equal halves of the work; none if there is no listener.

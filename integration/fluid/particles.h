@@ -32,7 +32,7 @@ struct Particles {
 };
 
 /// Creates particles at jittered positions inside a level set, none outside. Throws std::invalid_argument if the grid
-/// is no level set, its voxels are no cubes, or `perVoxel` is out of range; and Cancelled.
+/// is no level set, its voxels are not cubes, or `perVoxel` is out of range; and Cancelled.
 Particles particles(const openvdb::FloatGrid& liquid, const ParticleOptions& options = {});
 
 /// Creates particles inside a body, in the voxels of a solver's grid. If the field has its mesh, no particle is on the

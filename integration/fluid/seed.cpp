@@ -31,7 +31,7 @@ constexpr float rounding = 1e-5f;  // tolerance of a half width that is a whole 
 
 void requireLiquid(const FloatGrid& liquid) {
     if (liquid.getGridClass() != openvdb::GRID_LEVEL_SET) refuse("the liquid's grid is no level set");
-    if (!liquid.transform().isLinear() || !liquid.hasUniformVoxels()) refuse("the liquid's voxels are no cubes");
+    if (!liquid.transform().isLinear() || !liquid.hasUniformVoxels()) refuse("the liquid's voxels are not cubes");
     if (!(liquid.background() >= minHalfWidth * liquid.voxelSize()[0] * (1 - rounding)))
         refuse("the liquid's band is narrower than 3 voxels");
     if (!std::isfinite(liquid.background())) refuse("the liquid's background is not finite");

@@ -66,7 +66,7 @@ struct SeedReport {
 /// creases, walls and gaps below a voxel, they are changed by fractions of a voxel if that check needs it; SeedReport
 /// states how far.
 ///
-/// Throws std::invalid_argument if the grid is no level set, its voxels are no cubes, or its band is narrower than 3
+/// Throws std::invalid_argument if the grid is no level set, its voxels are not cubes, or its band is narrower than 3
 /// voxels, and for everything that regrid() refuses. Throws std::runtime_error if no level set of this voxel size could
 /// be made, and Cancelled. The grid is then unchanged.
 SeedReport seed(openvdb::FloatGrid& liquid, const Mesh& mesh, const Placement& placement = {},

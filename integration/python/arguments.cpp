@@ -10,7 +10,10 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
+#include <bilayer/sdf/level_set.h>
+
 #include "integration/python/arrays.h"
+#include "integration/python/convert.h"
 
 namespace bilayer::python {
 namespace {
@@ -37,19 +40,20 @@ Pose poseOfMatrix(const Floats& matrix, const char* name) {
 
 }  // namespace
 
-SharedMesh meshOf(const py::object& object) {
+SharedMesh meshOf(const py::object& object, const char* name) {
     if (py::isinstance<Mesh>(object)) return object.cast<SharedMesh>();
-    return py::module_::import("bilayer.meshes").attr("as_mesh")(object).cast<SharedMesh>();
+    return py::module_::import("bilayer.meshes").attr("mesh_of")(object, name).cast<SharedMesh>();
+}
+
+void requireOrder(const py::object& levelSet, const py::object& mesh, const char* call) {
+    if (py::isinstance<LevelSet>(mesh) && !py::isinstance<LevelSet>(levelSet))
+        throw std::invalid_argument(fmt::format("level_set: the level set and the mesh are swapped, call {}", call));
 }
 
 Pose poseOf(const py::object& object, const char* name) {
     if (object.is_none()) return {};
     if (py::isinstance<Pose>(object)) return object.cast<Pose>();
-    const Floats matrix(object, name, {4, 4});
-    if (!matrix.shape().empty())
-        throw std::invalid_argument(fmt::format("{}: expected a Pose or one matrix of shape (4, 4), got {} of them",
-                                                name, text(matrix.shape())));
-    return poseOfMatrix(matrix, name);
+    return poseOfMatrix(Floats(object, name, {4, 4}, Range::finite, Items::one), name);
 }
 
 void requirePositive(double value, const char* name) {
@@ -57,19 +61,23 @@ void requirePositive(double value, const char* name) {
         throw std::invalid_argument(fmt::format("{} is {}, and must be above 0 and finite", name, value));
 }
 
-std::string pathOf(const py::object& path) {
-    return py::module_::import("os").attr("fsdecode")(path).cast<std::string>();
+void requireNotNegative(double value, const char* name) {
+    if (!(value >= 0) || !std::isfinite(value))
+        throw std::invalid_argument(fmt::format("{} is {}, and must be 0 or above, and finite", name, value));
 }
 
-std::string existingFile(const py::object& path) {
-    const std::string text = pathOf(path);
+Path pathOf(const py::object& object, const char* name) {
+    if (!py::isinstance<py::str>(object) && !py::isinstance<py::bytes>(object) && !py::hasattr(object, "__fspath__"))
+        refuseType(name, "a str, bytes or os.PathLike", object);
+    return {py::module_::import("os").attr("fsdecode")(object).cast<std::string>()};
+}
+
+void requireExisting(const Path& path) {
     std::error_code error;
-    if (!std::filesystem::exists(text, error)) {
-        errno = ENOENT;
-        PyErr_SetFromErrnoWithFilenameObject(PyExc_FileNotFoundError, path.ptr());
-        throw py::error_already_set();
-    }
-    return text;
+    if (std::filesystem::exists(path.text, error)) return;
+    errno = ENOENT;
+    PyErr_SetFromErrnoWithFilename(PyExc_FileNotFoundError, path.text.c_str());
+    throw py::error_already_set();
 }
 
 }  // namespace bilayer::python

@@ -21,8 +21,13 @@ namespace py = pybind11;
 /// Meshes are immutable and shared in Python. A holder of a non-const type is what pybind11 supports.
 using SharedMesh = std::shared_ptr<Mesh>;
 
-/// A bilayer.Mesh, or what bilayer.as_mesh() makes of another object.
-SharedMesh meshOf(const py::object& object);
+/// A bilayer.Mesh, or what bilayer.as_mesh() makes of another object. Throws std::invalid_argument that names the
+/// argument.
+SharedMesh meshOf(const py::object& object, const char* name);
+
+/// Throws std::invalid_argument if a level set and a mesh are given in the wrong order.
+/// @param call  how it is right: "Field(level_set, mesh)"
+void requireOrder(const py::object& levelSet, const py::object& mesh, const char* call);
 
 /// A Pose, an array of shape (4, 4), or None for the identity. Throws std::invalid_argument that names the argument if
 /// the matrix is no rotation with a translation.
@@ -48,9 +53,16 @@ Value byWord(const std::array<std::pair<const char*, Value>, count>& words, cons
 /// Throws std::invalid_argument that names the argument unless a number is above 0 and finite.
 void requirePositive(double value, const char* name);
 
+/// Throws std::invalid_argument that names the argument unless a number is 0 or above, and finite.
+void requireNotNegative(double value, const char* name);
+
 /// A path as Python's file functions accept it: str, bytes or os.PathLike.
-std::string pathOf(const py::object& path);
-/// The same of an existing file; raises FileNotFoundError otherwise.
-std::string existingFile(const py::object& path);
+struct Path {
+    std::string text;
+};
+/// Throws std::invalid_argument that names the argument.
+Path pathOf(const py::object& object, const char* name);
+/// Raises FileNotFoundError unless the file exists.
+void requireExisting(const Path& path);
 
 }  // namespace bilayer::python

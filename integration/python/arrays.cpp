@@ -32,8 +32,10 @@ py::array arrayOf(const py::handle& object) {
     return py::array::ensure(object);
 }
 
-bool isWithin(float value, Range range) {
+bool isWithin(double value, Range range) {
     switch (range) {
+        case Range::any:
+            return true;
         case Range::finite:
             return std::isfinite(value);
         case Range::positiveOrInfinite:
@@ -48,15 +50,20 @@ const char* nameOf(Range range) {
     return range == Range::finite ? "finite" : range == Range::nonNegative ? "0 or above, and finite" : "0 or above";
 }
 
-// The first value out of the range.
-std::optional<std::size_t> firstOutside(std::span<const float> values, Range range) {
+bool isTooLarge(double value) {
+    return std::isfinite(value) && std::abs(value) > double(std::numeric_limits<float>::max());
+}
+
+// The first value out of the range, or beyond float32.
+template <class Value>
+std::optional<std::size_t> firstOutside(std::span<const Value> values, Range range) {
     for (std::size_t begin = 0; begin < values.size(); begin += checkedAtOnce) {
         const auto part = values.subspan(begin, std::min(checkedAtOnce, values.size() - begin));
         bool allFinite = true;
-        for (const float value : part) allFinite &= std::abs(value) <= std::numeric_limits<float>::max();
+        for (const Value value : part) allFinite &= std::abs(value) <= Value(std::numeric_limits<float>::max());
         if (allFinite && range == Range::finite) continue;
         for (std::size_t i = 0; i < part.size(); ++i)
-            if (!isWithin(part[i], range)) return begin + i;
+            if (!isWithin(double(part[i]), range) || isTooLarge(double(part[i]))) return begin + i;
     }
     return std::nullopt;
 }
@@ -77,32 +84,59 @@ bool endsWith(const py::array& array, const Shape& item) {
     return axes >= item.size() && std::equal(item.begin(), item.end(), array.shape() + (axes - item.size()));
 }
 
-}  // namespace
-
-std::string text(const Shape& shape, bool wildcard) {
-    std::string axes = wildcard ? "..." : "";
-    for (const py::ssize_t length : shape) axes += fmt::format("{}{}", axes.empty() ? "" : ", ", length);
-    return "(" + axes + (shape.size() == 1 && !wildcard ? ",)" : ")");
+// "real numbers of shape (..., 3)".
+std::string expectation(const Shape& item, Items items) {
+    if (item.empty() && items == Items::one) return "a real number";
+    if (item.empty() && items == Items::any) return "real numbers";
+    std::string axes = items == Items::any ? "..." : items == Items::list ? "N" : "";
+    for (const py::ssize_t length : item) axes += fmt::format("{}{}", axes.empty() ? "" : ", ", length);
+    const bool comma = item.size() + (items != Items::one) == 1;
+    return fmt::format("an array of real numbers of shape ({}{})", axes, comma ? "," : "");
 }
 
-Floats::Floats(const py::handle& object, const char* name, Shape item, Range range) : name_(name), item_(item) {
-    const std::string expected =
-        item.empty() ? "real numbers" : fmt::format("an array of real numbers of shape {}", text(item, true));
+}  // namespace
+
+std::string text(const Shape& shape) {
+    std::string axes;
+    for (const py::ssize_t length : shape) axes += fmt::format("{}{}", axes.empty() ? "" : ", ", length);
+    return "(" + axes + (shape.size() == 1 ? ",)" : ")");
+}
+
+Floats::Floats(const py::handle& object, const char* name, Shape item, Range range, Items items)
+    : name_(name), item_(item) {
     const py::array array = arrayOf(object);
-    if (!array || std::string("fiu").find(array.dtype().kind()) == std::string::npos || !endsWith(array, item))
-        refuse(name, expected, description(object, array));
+    const auto leading = array ? array.ndim() - py::ssize_t(item.size()) : -1;
+    const bool fits = items == Items::any || leading == (items == Items::list ? 1 : 0);
+    if (!array || std::string("fiu").find(array.dtype().kind()) == std::string::npos || !endsWith(array, item) || !fits)
+        refuse(name, expectation(item, items), description(object, array));
+    shape_.assign(array.shape(), array.shape() + leading);
+    convert(array, range);
+}
+
+void Floats::convert(const py::array& array, Range range) {
+    const auto check = [&](const auto* data, py::ssize_t size) {
+        const std::span values(data, std::size_t(size));
+        const std::optional<std::size_t> wrong = firstOutside(values, range);
+        if (!wrong) return;
+        const auto value = double(values[*wrong]);
+        throw std::invalid_argument(fmt::format("{}{} is {}, and must be {}", name_, indexText(*wrong, wholeShape()),
+                                                value, isTooLarge(value) ? "in the range of float32" : nameOf(range)));
+    };
+    // numpy would warn of each double beyond the range of floats
+    if (array.dtype().kind() == 'f' && array.dtype().itemsize() > py::ssize_t(sizeof(float))) {
+        const auto doubles = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(array);
+        if (!doubles) refuse(name_, "numbers in the range of float32", description(array, array));
+        array_ = py::array_t<float, py::array::c_style>(wholeShape());
+        float* const to = array_.mutable_data();
+        const py::gil_scoped_release release;
+        check(doubles.data(), doubles.size());
+        std::transform(doubles.data(), doubles.data() + doubles.size(), to, [](double value) { return float(value); });
+        return;
+    }
     array_ = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(array);
     if (!array_) throw py::error_already_set();
-    shape_.assign(array.shape(), array.shape() + (std::size_t(array.ndim()) - item.size()));
-    const auto values = as<float>();
-    std::optional<std::size_t> wrong;
-    {
-        const py::gil_scoped_release release;
-        wrong = firstOutside(values, range);
-    }
-    if (wrong)
-        throw std::invalid_argument(fmt::format("{}{} is {}, and must be {}", name, indexText(*wrong, wholeShape()),
-                                                values[*wrong], nameOf(range)));
+    const py::gil_scoped_release release;
+    check(array_.data(), array_.size());
 }
 
 Shape Floats::wholeShape() const {
@@ -129,8 +163,7 @@ Shape broadcast(std::initializer_list<Floats*> arguments) {
             const py::ssize_t a = axis(common), b = axis(shape);
             if (a != b && a != 1 && b != 1)
                 throw std::invalid_argument(fmt::format("{}: leading shape {} does not fit {} of leading shape {}",
-                                                        argument->name(), text(shape, false), longest->name(),
-                                                        text(common, false)));
+                                                        argument->name(), text(shape), longest->name(), text(common)));
             both[both.size() - 1 - i] = a == 1 ? b : a;
         }
         if (!longest || both != common) longest = argument;
@@ -145,10 +178,13 @@ std::vector<std::uint32_t> indices(const py::handle& object, const char* name, p
     const py::array array = arrayOf(object);
     const std::string shape = columns == 1 ? "(N,)" : fmt::format("(N, {})", columns);
     const std::string expected = fmt::format("an array of integers of shape {}", shape);
-    const bool empty = array && array.size() == 0;  // whose dtype is float64 for a list
+    // an empty list has no second axis, and the dtype float64
+    const bool empty = array && array.ndim() == 1 && array.size() == 0;
     const bool fits = array && (columns == 1 ? array.ndim() == 1 : array.ndim() == 2 && array.shape(1) == columns);
-    if (!array || (!empty && (!fits || std::string("iu").find(array.dtype().kind()) == std::string::npos)))
-        refuse(name, expected, description(object, array));
+    const bool integers = array && std::string("iu").find(array.dtype().kind()) != std::string::npos;
+    if (!empty && (!fits || !(integers || array.size() == 0))) refuse(name, expected, description(object, array));
+    // the largest unsigned numbers would become negative
+    const bool isUnsigned = integers && array.dtype().kind() == 'u';
     const auto values = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(array);
     if (!values) throw py::error_already_set();
     const std::int64_t* const data = values.data();
@@ -156,19 +192,26 @@ std::vector<std::uint32_t> indices(const py::handle& object, const char* name, p
     const py::gil_scoped_release release;
     std::vector<std::uint32_t> result(static_cast<std::size_t>(values.size()));
     for (std::size_t i = 0; i < result.size(); ++i) {
-        const std::int64_t value = data[i];
-        if (value < 0 || std::uint64_t(value) >= end)
+        const auto value = std::uint64_t(data[i]);
+        if (value >= end)
             throw std::invalid_argument(fmt::format("{}{} is {}, and must be {} of 0 to {}", name, indexText(i, whole),
-                                                    value, what, std::int64_t(end) - 1));
+                                                    isUnsigned ? std::to_string(value) : std::to_string(data[i]), what,
+                                                    std::int64_t(end) - 1));
         result[i] = std::uint32_t(value);
     }
     return result;
 }
 
+py::array_t<double> frozen(const py::handle& object, const char* name) {
+    const Floats numbers(object, name, {}, Range::any);  // for its errors
+    const py::object copy =
+        py::module_::import("numpy").attr("array")(object, py::arg("dtype") = "float64", py::arg("order") = "C");
+    copy.attr("flags").attr("writeable") = false;
+    return copy;
+}
+
 glm::vec3 vector(const py::handle& object, const char* name) {
-    const Floats floats(object, name, {3});
-    if (!floats.shape().empty()) refuse(name, "three numbers", "shape " + text(floats.shape()) + " of them");
-    return floats.points()[0];
+    return Floats(object, name, {3}, Range::finite, Items::one).points()[0];
 }
 
 glm::dvec3 doubleVector(const py::handle& object, const char* name) {

@@ -23,24 +23,33 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-/// "(4, 3)"; `wildcard` stands for any leading axes: "(..., 3)".
-std::string text(const Shape& shape, bool wildcard = false);
+/// "(4, 3)".
+std::string text(const Shape& shape);
 
 enum class Range {
+    any,
     finite,
     positiveOrInfinite,  ///< 0 or above, infinity included
     nonNegative,         ///< 0 or above, finite
 };
 
-/// Floats from any array of real numbers or nested list: items of a fixed shape, in an array of any shape. A C-ordered
-/// array of float32 is used without a copy.
+/// How many items an argument has.
+enum class Items {
+    any,   ///< an array of any shape
+    list,  ///< an array of one axis
+    one,   ///< no axis
+};
+
+/// Floats from any array of real numbers or nested list: items of a fixed shape. A C-ordered array of float32 is used
+/// without a copy.
 class Floats {
   public:
     /// @param name  the argument, for errors
     /// @param item  the shape of an item: {3} for points, {} for numbers
     /// Throws std::invalid_argument that names the argument, its shape or type, and what was expected; for a value out
-    /// of the range also its index.
-    Floats(const py::handle& object, const char* name, Shape item, Range range = Range::finite);
+    /// of the range, or beyond that of float32, also its index.
+    Floats(const py::handle& object, const char* name, Shape item, Range range = Range::finite,
+           Items items = Items::any);
 
     const char* name() const { return name_; }
     /// The leading axes: (4, 5) for points in an array of shape (4, 5, 3).
@@ -58,6 +67,7 @@ class Floats {
 
   private:
     Shape wholeShape() const;
+    void convert(const py::array& array, Range range);
 
     py::array_t<float, py::array::c_style> array_;
     const char* name_;
@@ -72,6 +82,9 @@ Shape broadcast(std::initializer_list<Floats*> arguments);
 /// index that is negative or not below `end`, which it names by `what`: "a vertex".
 std::vector<std::uint32_t> indices(const py::handle& object, const char* name, py::ssize_t columns, std::uint64_t end,
                                    const char* what);
+
+/// A read-only copy of an array of real numbers, as float64. Throws as Floats does for what is no such array.
+py::array_t<double> frozen(const py::handle& object, const char* name);
 
 /// Three numbers. Throws as Floats does.
 glm::vec3 vector(const py::handle& object, const char* name);

@@ -15,63 +15,52 @@
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
 #include "integration/python/cancellable.h"
+#include "integration/python/define.h"
 #include "sdf/base/method_names.h"
 
 namespace bilayer::python {
 namespace {
 
-// The keyword arguments of a call. Each is taken once; what is left at the end is unknown.
+// The options of a call. None is the default.
 class Keywords {
   public:
-    explicit Keywords(const py::kwargs& given) : left_(given.attr("copy")()) {}
+    explicit Keywords(py::dict given) : given_(std::move(given)) {}
 
-    // None counts as not given. Raises TypeError for a value of another type.
     template <class Value>
-    std::optional<Value> take(const char* name, const char* expected) {
-        if (!left_.contains(name)) return std::nullopt;
-        const py::object value = left_.attr("pop")(name);
-        if (value.is_none()) return std::nullopt;
-        try {
-            return value.cast<Value>();
-        } catch (const py::cast_error&) {
-            throw py::type_error(fmt::format("{}: expected {}, got {}", name, expected, Py_TYPE(value.ptr())->tp_name));
-        }
+    std::optional<Value> take(const char* name) const {
+        return given_.contains(name) ? argument<std::optional<Value>>(given_[name], name) : std::nullopt;
     }
 
-    std::optional<double> positive(const char* name) {
-        const auto value = take<double>(name, "a number");
+    std::optional<double> positive(const char* name) const {
+        const auto value = take<double>(name);
         if (value) requirePositive(*value, name);
         return value;
     }
 
     template <class Value>
-    void set(Value& option, const char* name, const char* expected) {
-        if (const auto value = take<Value>(name, expected)) option = *value;
-    }
-
-    void requireEmpty(const char* function) const {
-        for (const auto& [name, value] : left_)
-            throw py::type_error(fmt::format("{}() has no argument '{}'", function, py::str(name).cast<std::string>()));
+    void set(Value& option, const char* name) const {
+        if (const auto value = take<Value>(name)) option = *value;
     }
 
   private:
-    py::dict left_;
+    py::dict given_;
 };
 
-void setVoxelSize(Keywords& keywords, const Mesh& mesh, BuildOptions& options) {
+void setVoxelSize(const Keywords& keywords, const Mesh& mesh, BuildOptions& options) {
     const auto size = keywords.positive("voxel_size"), resolution = keywords.positive("resolution");
     if (bool(size) == bool(resolution))
-        throw std::invalid_argument("expected exactly one of voxel_size and resolution");
+        throw std::invalid_argument("voxel_size, resolution: expected exactly one of them");
     options.voxelSize = size ? float(*size) : voxelSizeFor(mesh, float(*resolution));
 }
 
-void setBand(Keywords& keywords, BuildOptions& options) {
+void setBand(const Keywords& keywords, BuildOptions& options) {
     const auto world = keywords.positive("half_width"), voxels = keywords.positive("half_width_voxels");
     const auto exterior = keywords.positive("exterior_width_voxels");
     const auto interior = keywords.positive("interior_width_voxels");
     if (bool(world) + bool(voxels) + (exterior || interior) > 1)
         throw std::invalid_argument(
-            "expected only one of half_width, half_width_voxels, and exterior_width_voxels with interior_width_voxels");
+            "half_width: expected only one of half_width, half_width_voxels, and exterior_width_voxels with "
+            "interior_width_voxels");
     if (world && *world > 1000 * double(options.voxelSize))
         throw std::invalid_argument(fmt::format(
             "half_width is {:g} in the mesh's unit, which is {:.0f} voxels of {:g}, and must be at most 1000 voxels; "
@@ -98,34 +87,32 @@ std::optional<OpenclFiller> fillerOf(const std::string& device) {
     if (device != opencl && !named)
         throw std::invalid_argument(fmt::format(
             "device: expected 'cpu', 'opencl' or 'opencl:' and a part of a device's name, got '{}'", device));
+    const py::gil_scoped_release release;
     return openclFiller(openDevice(named ? device.substr(opencl.size() + 1) : ""));
 }
 
-Request requestOf(const py::kwargs& given, const Mesh& mesh, const char* function) {
-    Keywords keywords(given);
+Request requestOf(const Options& given, const Mesh& mesh) {
+    const Keywords keywords(given.values);
     Request request;
     BuildOptions& options = request.options;
     setVoxelSize(keywords, mesh, options);
     setBand(keywords, options);
-    if (const auto word = keywords.take<std::string>("method", "a string"))
+    if (const auto word = keywords.take<std::string>("method"))
         options.method = byWord(bilayer::detail::methodNames, *word, "method");
-    if (const auto word = keywords.take<std::string>("sign", "a string"))
+    if (const auto word = keywords.take<std::string>("sign"))
         options.sign = byWord(bilayer::detail::signNames, *word, "sign");
-    keywords.set(options.gapVoxels, "gap_voxels", "a number");
-    keywords.set(options.unite, "unite", "True or False");
-    keywords.set(options.triangles, "triangles", "True or False");
-    keywords.set(options.threads, "threads", "an integer");
-    keywords.set(options.doubleLayer.delta, "delta", "a number");
-    keywords.set(options.doubleLayer.epsilon, "epsilon", "a number");
-    keywords.set(options.doubleLayer.neighbourhood, "neighbourhood", "an integer");
-    keywords.set(options.doubleLayer.maxSubdivision, "max_subdivision", "an integer");
-    if (const auto progress = keywords.take<py::object>("progress", "a callable")) {
-        if (!PyCallable_Check(progress->ptr())) throw py::type_error("progress: expected a callable");
-        request.progress = *progress;
-    }
-    const auto device = keywords.take<std::string>("device", "a string");
-    keywords.requireEmpty(function);
-    if (device) request.filler = fillerOf(*device);
+    keywords.set(options.gapVoxels, "gap_voxels");
+    keywords.set(options.unite, "unite");
+    keywords.set(options.triangles, "triangles");
+    keywords.set(options.threads, "threads");
+    keywords.set(options.doubleLayer.delta, "delta");
+    keywords.set(options.doubleLayer.epsilon, "epsilon");
+    keywords.set(options.doubleLayer.neighbourhood, "neighbourhood");
+    keywords.set(options.doubleLayer.maxSubdivision, "max_subdivision");
+    keywords.set(request.progress, "progress");
+    if (!request.progress.is_none() && !PyCallable_Check(request.progress.ptr()))
+        refuseType("progress", "a callable", request.progress);
+    if (const auto device = keywords.take<std::string>("device")) request.filler = fillerOf(*device);
     return request;
 }
 
@@ -137,9 +124,8 @@ LevelSet run(Request& request, const std::function<LevelSet(const BuildOptions&)
     });
 }
 
-LevelSet buildField(const py::object& object, const py::kwargs& keywords) {
-    const SharedMesh mesh = meshOf(object);
-    Request request = requestOf(keywords, *mesh, "build");
+LevelSet buildField(const SharedMesh& mesh, const Options& options) {
+    Request request = requestOf(options, *mesh);
     const BlockFiller* filler = request.filler ? &*request.filler : nullptr;
     return run(request, [&](const BuildOptions& options) { return build(*mesh, options, filler); });
 }
@@ -156,11 +142,9 @@ std::vector<std::uint32_t> movedTriangles(const Mesh& before, const Mesh& after)
     return moved;
 }
 
-LevelSet rebuildField(const LevelSet& old, const py::object& oldObject, const py::object& newObject,
-                      const py::object& moved, const py::kwargs& keywords) {
-    const SharedMesh before = meshOf(oldObject), after = meshOf(newObject);
-    Request request = requestOf(keywords, *before, "rebuild");
-    if (request.filler) throw std::invalid_argument("device: rebuild() runs on the 'cpu'");
+LevelSet rebuildField(const LevelSet& old, const SharedMesh& before, const SharedMesh& after, const py::object& moved,
+                      const Options& options) {
+    Request request = requestOf(options, *before);
     std::vector<std::uint32_t> triangles;
     if (!moved.is_none()) triangles = indices(moved, "moved", 1, after->triangles.size(), "a face");
     return run(request, [&, given = !moved.is_none()](const BuildOptions& options) {
@@ -169,8 +153,12 @@ LevelSet rebuildField(const LevelSet& old, const py::object& oldObject, const py
 }
 
 py::list listDevices() {
+    const std::vector<DeviceInfo> found = [] {
+        const py::gil_scoped_release release;
+        return devices();
+    }();
     py::list list;
-    for (const DeviceInfo& device : devices()) {
+    for (const DeviceInfo& device : found) {
         py::dict entry;
         entry["platform"] = device.platform;
         entry["name"] = device.name;
@@ -182,7 +170,10 @@ py::list listDevices() {
     return list;
 }
 
-constexpr const char* buildDoc = R"(build(mesh, *, resolution | voxel_size, ...) -> LevelSet
+constexpr const char* buildDoc = R"(build(mesh, *, resolution=None, voxel_size=None, half_width=None,
+      half_width_voxels=None, exterior_width_voxels=None, interior_width_voxels=None,
+      method="exact", sign="auto", gap_voxels=2, unite=False, triangles=False, threads=0, device="cpu",
+      delta=0.5, epsilon=1, neighbourhood=2, max_subdivision=32, progress=None) -> LevelSet
 
 Builds the narrow-band signed distance field of a mesh on all cores. The bytes of the field do not depend on the number
 of threads. Ctrl-C cancels.
@@ -192,15 +183,15 @@ resolution: voxels along the longest side of the mesh's bounds; or
 voxel_size: the edge of a voxel, in the mesh's unit.
 half_width: width of the band on each side of the surface, in the mesh's unit; or
 half_width_voxels: the same in voxels, default 3; or
-exterior_width_voxels, interior_width_voxels: each side by itself.
-method: "exact" (default), "double-layer", "pseudonormal"; "prism" needs an OpenCL device.
-sign: "auto" (default), "normals", "winding" or "flood".
-gap_voxels: widest gap that "flood" closes, default 2.
-unite: build the union of overlapping solids, default False.
-triangles: also store the nearest face of each voxel (LevelSet.sparse), default False.
-threads: maximum number of threads; 0, the default, for all.
-device: "cpu" (default), "opencl", or "opencl:" and a part of a device's name.
-delta, epsilon, neighbourhood, max_subdivision: of the double layer method.
+exterior_width_voxels, interior_width_voxels: the width of one side alone, in voxels.
+method: "exact", "double-layer" or "pseudonormal"; "prism" needs device="opencl".
+sign: "auto", "normals", "winding" or "flood".
+gap_voxels: widest gap that "flood" closes.
+unite: build the union of overlapping solids.
+triangles: also store the nearest face of each voxel (LevelSet.sparse).
+threads: maximum number of threads; 0 for all.
+device: "cpu", "opencl" for the first OpenCL device, or "opencl:" and a part of a device's name.
+delta, epsilon, neighbourhood, max_subdivision: parameters of the double layer method.
 progress: called with the fraction done, 0 to 1, on the calling thread; return False to cancel.
 
 Raises ValueError that names the argument or the face, TypeError for an unknown argument, Cancelled after progress
@@ -212,7 +203,11 @@ returned False, DeviceError for errors of a device, and what progress raises.
 ('normals', 0.03125)
 )";
 
-constexpr const char* rebuildDoc = R"(rebuild(level_set, old_mesh, new_mesh, moved=None, *, ...) -> LevelSet
+constexpr const char* rebuildDoc =
+    R"(rebuild(level_set, old_mesh, new_mesh, moved=None, *, resolution=None, voxel_size=None,
+        half_width=None, half_width_voxels=None, exterior_width_voxels=None, interior_width_voxels=None,
+        method="exact", sign="auto", gap_voxels=2, unite=False, triangles=False, threads=0,
+        delta=0.5, epsilon=1, neighbourhood=2, max_subdivision=32, progress=None) -> LevelSet
 
 Updates a field after some faces of its mesh have moved. Fills only the blocks near those; the bytes equal those of
 build(new_mesh, ...). Needs the options of the build that made `level_set`; `resolution` refers to old_mesh.
@@ -234,7 +229,8 @@ True
 
 constexpr const char* devicesDoc = R"(devices() -> list of dict
 
-The OpenCL devices: platform, name, gpu, compute_units, memory_bytes. Raises DeviceError if a platform fails to answer.
+The OpenCL devices, each with the keys "platform" and "name" (str), "gpu" (bool), "compute_units" and "memory_bytes"
+(int). Raises DeviceError if a platform fails to answer.
 
 >>> import bilayer
 >>> all(device["memory_bytes"] > 0 for device in bilayer.devices())
@@ -244,10 +240,9 @@ True
 }  // namespace
 
 void addBuild(py::module_& module) {
-    module.def("build", buildField, py::arg("mesh"), buildDoc);
-    module.def("rebuild", rebuildField, py::arg("level_set"), py::arg("old_mesh"), py::arg("new_mesh"),
-               py::arg("moved") = py::none(), rebuildDoc);
-    module.def("devices", listDevices, devicesDoc);
+    define(module, buildDoc, buildField);
+    define(module, rebuildDoc, rebuildField);
+    define(module, devicesDoc, listDevices);
 }
 
 }  // namespace bilayer::python

@@ -11,6 +11,8 @@
 
 #include <bilayer/sdf/options.h>
 
+#include "integration/python/convert.h"
+
 namespace bilayer::python {
 namespace {
 
@@ -29,7 +31,9 @@ void throwIfSignalled() {
 bool report(const py::object& progress, float fraction) {
     if (progress.is_none()) return true;
     const py::object answer = progress(fraction);
-    return answer.is_none() || answer.cast<bool>();
+    if (answer.is_none()) return true;
+    if (!py::isinstance<py::bool_>(answer)) refuseType("progress", "it to return True, False or None", answer);
+    return answer.cast<bool>();
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "integration/python/define.h"
 #include "integration/python/objects.h"
 
 namespace bilayer::python {
@@ -40,56 +41,59 @@ py::object massOf(const py::object& solid) {
         const py::gil_scoped_release release;
         mass = massProperties(levelSet);
     } else {
-        const SharedMesh mesh = meshOf(solid);
+        const SharedMesh mesh = meshOf(solid, "solid");
         const py::gil_scoped_release release;
         mass = massProperties(*mesh);
     }
     return toResult(*mass);
 }
 
-ColliderOptions optionsOf(float pointSpacing, const py::object& margin, const std::string& accuracy) {
+ColliderOptions optionsOf(float pointSpacing, std::optional<float> margin, const std::string& accuracy) {
     requirePositive(double(pointSpacing), "point_spacing_voxels");
     ColliderOptions options{.pointSpacingVoxels = pointSpacing, .accuracy = byWord(accuracies, accuracy, "accuracy")};
-    if (margin.is_none()) return options;
-    options.margin = margin.cast<float>();
-    if (!(options.margin >= 0) || !std::isfinite(options.margin))
-        throw std::invalid_argument(fmt::format("margin is {}, and must be 0 or above", options.margin));
+    if (!margin) return options;
+    requireNotNegative(double(*margin), "margin");
+    options.margin = *margin;
     return options;
 }
 
-ColliderObject makeCollider(const py::object& mesh, const LevelSet& levelSet, float pointSpacing,
-                            const py::object& margin, const std::string& accuracy) {
-    const SharedMesh shared = meshOf(mesh);
+ColliderObject makeCollider(const py::object& mesh, const py::object& levelSet, float pointSpacing,
+                            std::optional<float> margin, const std::string& accuracy) {
+    requireOrder(levelSet, mesh, "Collider(mesh, level_set)");
+    const auto& distances = argument<const LevelSet&>(levelSet, "level_set");
+    const SharedMesh shared = meshOf(mesh, "mesh");
     const ColliderOptions options = optionsOf(pointSpacing, margin, accuracy);
     py::dict keywords;
     keywords["point_spacing_voxels"] = pointSpacing;
-    keywords["margin"] = margin;
+    keywords["margin"] = margin ? py::object(py::float_(double(*margin))) : py::none();
     keywords["accuracy"] = accuracy;
     const py::object make =
         py::module_::import("functools").attr("partial")(py::type::of<ColliderObject>(), **keywords);
-    const py::tuple recipe = py::make_tuple(make, py::make_tuple(shared, levelSet));
+    const py::tuple recipe = py::make_tuple(make, py::make_tuple(shared, distances));
     const auto collider = [&] {
         const py::gil_scoped_release release;
-        return Collider(*shared, levelSet, options);
+        return Collider(*shared, distances, options);
     };
-    return {collider(), recipe};
+    return {collider(), recipe, distances.origin()};
 }
 
-LevelSet storeBody(const LevelSet& levelSet, const py::object& mesh, float pointSpacing, const py::object& margin,
+LevelSet storeBody(const py::object& levelSet, const py::object& mesh, float pointSpacing, std::optional<float> margin,
                    const std::string& accuracy, bool keepMesh) {
-    const SharedMesh shared = meshOf(mesh);
+    requireOrder(levelSet, mesh, "with_body(level_set, mesh)");
+    const auto& distances = argument<const LevelSet&>(levelSet, "level_set");
+    const SharedMesh shared = meshOf(mesh, "mesh");
     const ColliderOptions options = optionsOf(pointSpacing, margin, accuracy);
     const py::gil_scoped_release release;
-    return withBody(levelSet, *shared, options, keepMesh);
+    return withBody(distances, *shared, options, keepMesh);
 }
 
 ColliderObject restore(const LevelSet& levelSet) {
-    const py::object make = py::module_::import("operator").attr("methodcaller")("from_level_set", levelSet);
     const auto collider = [&] {
         const py::gil_scoped_release release;
         return Collider(levelSet);
     };
-    return {collider(), py::make_tuple(make, py::make_tuple(py::type::of<ColliderObject>()))};
+    const py::object make = py::type::of<ColliderObject>().attr("from_level_set");
+    return {collider(), py::make_tuple(make, py::make_tuple(levelSet)), levelSet.origin()};
 }
 
 // A field of a collider, which pickles as the collider and the attribute's name.
@@ -100,7 +104,7 @@ FieldObject fieldOf(const py::object& self, const Field& (Collider::*member)() c
         return (collider.*member)();
     };
     const py::object get = py::module_::import("builtins").attr("getattr");
-    return {field(), py::make_tuple(get, py::make_tuple(self, attribute))};
+    return {field(), py::make_tuple(get, py::make_tuple(self, attribute)), collider.origin};
 }
 
 SharedMesh meshOfCollider(const Collider& collider) {
@@ -114,7 +118,7 @@ constexpr const char* colliderDoc =
 The shape of a rigid body for collide() and distance(): a field, surface points and sharp edges. Immutable; share it
 between bodies and threads. Pickles hold the mesh, the level set and the options.
 
-mesh, level_set: a mesh and the field that build() made of it.
+mesh, level_set: a mesh and the field that build() made of it. Poses place the coordinates of Mesh.vertices.
 point_spacing_voxels: distance between neighbouring surface points, in voxels.
 margin: contacts are created up to this separation, in the mesh's unit; None for one voxel.
 accuracy: "samples", "exact-near-features" or "exact": where contacts take distances from the triangles.
@@ -128,13 +132,10 @@ Raises ValueError for options out of range, and if the level set belongs to anot
 )";
 
 constexpr const char* massDoc =
-    R"(mass_properties(solid) -> MassProperties(volume, centre, inertia, principal_inertia, principal_axes)
+    R"(mass_properties(solid) -> MassProperties
 
-Mass properties for density 1, of a closed mesh, or of the inside of a LevelSet.
-
-volume: float. centre: float32 (3,). inertia: float32 (3, 3), about the centre of mass.
-principal_inertia: float32 (3,), ascending. principal_axes: float32 (4,), the quaternion w, x, y, z that rotates
-them to the axes of the mesh.
+Mass properties for density 1, of a mesh, or of the inside of a LevelSet. Holes of a mesh are filled. The centre is in
+the coordinates of Mesh.vertices.
 
 Raises ValueError for a solid without volume.
 
@@ -150,6 +151,8 @@ constexpr const char* bodyDoc =
 The level set with all that Collider.from_level_set() needs, for LevelSet.save() and pickles. Options as for Collider.
 
 keep_mesh: False stores no mesh; contacts then follow the samples, which round sharp edges.
+
+Raises ValueError for options out of range, if the level set belongs to another mesh, and for a mesh too large to store.
 
 >>> import bilayer
 >>> box = bilayer.box()
@@ -172,12 +175,10 @@ Restores the collider that with_body() stored. Raises ValueError if there is non
 }  // namespace
 
 void addCollider(py::module_& module) {
-    py::class_<ColliderObject>(module, "Collider", colliderDoc)
-        .def(py::init(&makeCollider), py::arg("mesh"), py::arg("level_set"), py::kw_only(),
-             py::arg("point_spacing_voxels") = 2.f, py::arg("margin") = py::none(),
-             py::arg("accuracy") = "exact-near-features")
-        .def_static("from_level_set", restore, py::arg("level_set"), fromLevelSetDoc)
-        .def_property_readonly(
+    py::class_<ColliderObject> type(module, "Collider", colliderDoc);
+    defineConstructor(type, colliderDoc, makeCollider);
+    defineStatic(type, fromLevelSetDoc, restore);
+    type.def_property_readonly(
             "mesh", [](const ColliderObject& self) { return meshOfCollider(self); },
             "A copy of the mesh, with all faces outward and holes filled.")
         .def_property_readonly(
@@ -186,7 +187,8 @@ void addCollider(py::module_& module) {
             "exact_field", [](const py::object& self) { return fieldOf(self, &Collider::exactField, "exact_field"); },
             "The Field with the mesh, if the body has one.")
         .def_property_readonly(
-            "margin", [](const ColliderObject& self) { return self.margin(); }, "In the mesh's unit.")
+            "margin", [](const ColliderObject& self) { return self.margin(); },
+            "Contacts are created up to this separation, in the mesh's unit.")
         .def_property_readonly(
             "mass",
             [](const ColliderObject& self) {
@@ -204,10 +206,8 @@ void addCollider(py::module_& module) {
         .def("__repr__", [](const ColliderObject& self) {
             return fmt::format("Collider(voxels of {:g}, margin {:g})", self.field().voxelSize(), self.margin());
         });
-    module.def("mass_properties", massOf, py::arg("solid"), massDoc);
-    module.def("with_body", storeBody, py::arg("level_set"), py::arg("mesh"), py::kw_only(),
-               py::arg("point_spacing_voxels") = 2.f, py::arg("margin") = py::none(),
-               py::arg("accuracy") = "exact-near-features", py::arg("keep_mesh") = true, bodyDoc);
+    define(module, massDoc, massOf);
+    define(module, bodyDoc, storeBody);
 }
 
 }  // namespace bilayer::python

@@ -37,6 +37,10 @@ constexpr float maxStep = 1.5f;
 /// Minimum of the median, over voxels next to the surface, of the largest change to a neighbour [spacings]. Distances
 /// change by 1 / sqrt(3) or more, values in a larger unit by less.
 constexpr float minStepAtSurface = 0.4f;
+/// What to do with scipy's distance_transform_edt of the outside minus that of the inside.
+constexpr const char* halfSpacingHint =
+    "; distance transforms of the outside and the inside count from voxel centres: subtract half a spacing from each, "
+    "and then one from the other";
 /// Tolerance of an origin at whole voxels [voxels]: a rounding of double coordinates, and less than errors of fields.
 constexpr double originTolerance = 1e-4;
 
@@ -107,8 +111,8 @@ class DenseValues {
         if (!(*middle >= minStepAtSurface && *middle <= maxStep))
             throw std::invalid_argument(fmt::format(
                 "values: across the surface they change by {:.3g} spacings from voxel to voxel in the median, and "
-                "distances by 0.58 to 1: expected signed distances in the unit of the spacing",
-                *middle));
+                "distances by 0.58 to 1: expected signed distances in the unit of the spacing{}",
+                *middle, *middle > maxStep ? halfSpacingHint : ""));
     }
 
   private:
@@ -191,18 +195,20 @@ Widths widthsOf(const py::object& halfWidth, float minAtBorder, float deepest, d
 }
 
 // The index of voxel [0, 0, 0] in the grid.
-Coord shiftOf(const glm::dvec3& origin, const glm::dvec3& fieldOrigin, double spacing) {
+Coord shiftOf(const glm::dvec3& origin, double spacing) {
     Coord shift;
     for (int axis = 0; axis < 3; ++axis) {
-        const double voxels = (origin[axis] - fieldOrigin[axis]) / spacing, whole = std::round(voxels);
+        const double voxels = origin[axis] / spacing, whole = std::round(voxels);
         if (!(std::abs(voxels - whole) <= originTolerance))
             throw std::invalid_argument(fmt::format(
-                "origin[{}] is {:g}, which is {:g} voxels from field_origin, and must be whole voxels from it: pass "
-                "field_origin=origin, which queries are then relative to",
+                "origin[{}] is {:g}, which is {:g} voxels from zero, and must be whole voxels from it: pass "
+                "field_origin=origin in place of origin, and subtract that from the points of queries",
                 axis, origin[axis], voxels));
         if (!(std::abs(whole) < double(std::numeric_limits<int>::max() / 2)))
             throw std::invalid_argument(
-                fmt::format("origin[{}] is {:g} voxels from field_origin, and must be at most 2^30", axis, voxels));
+                fmt::format("origin[{}] is {:g} voxels from zero, and must be at most 2^30: pass field_origin=origin "
+                            "in place of origin, and subtract that from the points of queries",
+                            axis, voxels));
         shift[axis] = int(whole);
     }
     return shift;
@@ -266,8 +272,7 @@ py::object toDense(const LevelSet& levelSet, int padding) {
         openvdb::tools::copyToDense(grid, target);
     }
     const openvdb::Vec3d place = grid.indexToWorld(box.min());
-    return result("Dense", values, toArray(levelSet.origin() + glm::dvec3(place.x(), place.y(), place.z())),
-                  levelSet.voxelSize());
+    return result("Dense", values, toArray(glm::dvec3(place.x(), place.y(), place.z())), levelSet.voxelSize());
 }
 
 LevelSet fromDense(const py::object& array, const py::object& origin, double spacing, const py::object& halfWidth,
@@ -278,7 +283,7 @@ LevelSet fromDense(const py::object& array, const py::object& origin, double spa
         throw std::invalid_argument("values: expected real numbers of shape (nx, ny, nz), got shape " + text(shape));
     requirePositive(spacing, "spacing");
     const glm::dvec3 reference = doubleVector(fieldOrigin, "field_origin");
-    const Coord shift = shiftOf(doubleVector(origin, "origin"), reference, spacing);
+    const Coord shift = shiftOf(doubleVector(origin, "origin"), spacing);
     const DenseValues values(given.as<float>(), shape, spacing);
     float minAtBorder = 0, min = 0;
     {

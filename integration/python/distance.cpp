@@ -12,6 +12,7 @@
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
 #include "integration/python/cancellable.h"
+#include "integration/python/define.h"
 #include "integration/python/placed.h"
 
 namespace bilayer::python {
@@ -65,8 +66,7 @@ py::object findImpact(const py::object& a, const py::object& poseA, const py::ob
                       const py::object& poseB, const py::object& motionB, float scaleA, float scaleB, float tolerance,
                       bool penetration) {
     const PlacedShape first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");
-    if (!(tolerance >= 0) || !std::isfinite(tolerance))
-        throw std::invalid_argument(fmt::format("tolerance is {}, and must be 0 or above, and finite", tolerance));
+    requireNotNegative(double(tolerance), "tolerance");
     if (penetration && tolerance > 0)
         throw std::invalid_argument(fmt::format("tolerance is {}, and must be 0 with penetration=True", tolerance));
     Impact impact;
@@ -78,9 +78,7 @@ py::object findImpact(const py::object& a, const py::object& poseA, const py::ob
 }
 
 void requireIterable(const py::object& object, const char* name, const char* expected) {
-    if (!py::isinstance<py::iterable>(object))
-        throw std::invalid_argument(
-            fmt::format("{}: expected {}, got a '{}'", name, expected, Py_TYPE(object.ptr())->tp_name));
+    if (!py::isinstance<py::iterable>(object)) refuseType(name, expected, object);
 }
 
 std::vector<const Collider*> collidersOf(const py::object& object, std::size_t count) {
@@ -90,9 +88,7 @@ std::vector<const Collider*> collidersOf(const py::object& object, std::size_t c
         return colliders;
     }
     for (const py::handle& item : object) {
-        if (!py::isinstance<ColliderObject>(item))
-            throw std::invalid_argument(fmt::format("colliders: expected a Collider or a sequence of them, got a '{}'",
-                                                    Py_TYPE(item.ptr())->tp_name));
+        if (!py::isinstance<ColliderObject>(item)) refuseType("colliders", "a Collider or a sequence of them", item);
         colliders.push_back(item.cast<const ColliderObject*>());
     }
     if (colliders.size() != count)
@@ -127,14 +123,13 @@ py::object findDistances(const py::object& colliders, const py::object& poses, c
 constexpr const char* distanceDoc =
     R"(distance(a, pose_a, b, pose_b, *, scale_a=1, scale_b=1, max_distance=inf) -> BodyDistance
 
-The signed distance of two bodies. Of colliders, the triangles count.
+The signed distance of two bodies. Distances of colliders are those of their triangles.
 
 a, b: Collider or Shape, one of them a Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
-max_distance: bodies farther apart are not found.
+scale_a, scale_b: uniform scales, above 0.
+max_distance: 0 or above; bodies farther apart are not found.
 
-found: bool. overlap: "none", "surfaces", "a inside b" or "b inside a". distance: the separation, or minus the
-penetration depth. position_a, position_b: float32 (3,), the closest points. normal: float32 (3,), from b to a.
-triangle_a, triangle_b: faces of the closest points, -1 where not known.
+Raises ValueError that names the argument.
 
 >>> import bilayer
 >>> box = bilayer.box()
@@ -147,8 +142,11 @@ constexpr const char* distancesDoc = R"(distances(colliders, poses, pairs, max_d
 
 The distances of many pairs of bodies, on all cores. Ctrl-C cancels. inf for a pair farther apart than max_distance.
 
-colliders: a Collider, or one for each pose. poses: a sequence of poses. pairs: integers of shape (N, 2), indices of
-poses.
+colliders: a Collider, or one for each pose. poses: a sequence of poses, or matrices of shape (M, 4, 4).
+pairs: integers of shape (N, 2), indices of poses.
+max_distance: 0 or above.
+
+Raises ValueError that names the argument.
 
 >>> import bilayer
 >>> box = bilayer.box()
@@ -161,8 +159,8 @@ constexpr const char* impactDoc =
     R"(time_of_impact(a, pose_a, motion_a, b, pose_b, motion_b, *, scale_a=1, scale_b=1, tolerance=0,
                penetration=False) -> Impact
 
-When two bodies touch that move from their poses by their motions, at constant velocities. They do not touch before,
-whatever their speed and however thin they are.
+The first time at which two moving bodies touch. They move from their poses by their motions, at constant velocities.
+No touch is missed, whatever the speed and however thin the bodies are.
 
 a, b: Collider or Shape, one of them a Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
 motion_a, motion_b: displacement, and rotation vector [rad] about the pose's position, shape (2, 3); None for a body at
@@ -171,10 +169,6 @@ tolerance: bodies touch at this separation, in the meshes' unit; 0 for a twentie
 penetration: find the first penetration instead of the first touch. Bodies may start in contact, and rest, slide and
 roll on each other. A point penetrates that gets more than a third of the smaller voxel into the other body, or deeper
 than it starts. Points are those of the surface samples; what passes between them is not seen.
-
-found: bool, False if they do not touch in the whole motion; the other members are then invalid. fraction: float, of the
-motion until they touch, 0 to 1. pose_a, pose_b: Pose, then. distance: BodyDistance, then; of a penetration only
-its place and normal count.
 
 Raises ValueError that names the argument, for rotations by more than 1000 rad, and for planes and triangles that
 rotate.
@@ -193,14 +187,9 @@ False
 }  // namespace
 
 void addDistance(py::module_& module) {
-    const auto unlimited = py::arg("max_distance") = std::numeric_limits<float>::infinity();
-    module.def("distance", findDistance, py::arg("a"), py::arg("pose_a"), py::arg("b"), py::arg("pose_b"),
-               py::kw_only(), py::arg("scale_a") = 1.f, py::arg("scale_b") = 1.f, unlimited, distanceDoc);
-    module.def("distances", findDistances, py::arg("colliders"), py::arg("poses"), py::arg("pairs"), unlimited,
-               distancesDoc);
-    module.def("time_of_impact", findImpact, py::arg("a"), py::arg("pose_a"), py::arg("motion_a"), py::arg("b"),
-               py::arg("pose_b"), py::arg("motion_b"), py::kw_only(), py::arg("scale_a") = 1.f,
-               py::arg("scale_b") = 1.f, py::arg("tolerance") = 0.f, py::arg("penetration") = false, impactDoc);
+    define(module, distanceDoc, findDistance);
+    define(module, distancesDoc, findDistances);
+    define(module, impactDoc, findImpact);
 }
 
 }  // namespace bilayer::python

@@ -13,6 +13,8 @@
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
 #include "integration/python/cancellable.h"
+#include "integration/python/define.h"
+#include "integration/python/field_docs.h"
 #include "integration/python/objects.h"
 #include "sdf/base/unit_tolerance.h"
 
@@ -44,16 +46,33 @@ py::object sample(const FieldObject& field, const py::object& object) {
                   records.member(&Sample::inBand));
 }
 
-py::object closest(const FieldObject& field, const py::object& object, float maxDistance) {
-    const Floats points(object, "points", {3});
-    if (!(maxDistance >= 0))
-        throw std::invalid_argument(fmt::format("max_distance is {}, and must be 0 or above", maxDistance));
+// Where nothing was found, no member looks like an answer.
+void clearMissing(std::span<ClosestPoint> answers) {
+    constexpr float none = std::numeric_limits<float>::quiet_NaN();
+    for (ClosestPoint& answer : answers)
+        if (!answer.found) answer = {.position = glm::vec3(none), .normal = glm::vec3(none)};
+}
+
+// A limit for each point, or one for all of them, which is faster.
+void closestOf(const FieldObject& field, std::span<const glm::vec3> points, std::span<const float> limits,
+               std::span<ClosestPoint> answers) {
+    if (limits.size() == 1) return field.closest(points, answers, limits[0]);
+    for (std::size_t i = 0; i < points.size(); ++i) answers[i] = field.closest(points[i], limits[i]);
+}
+
+py::object closest(const FieldObject& field, const py::object& object, const py::object& maxDistance) {
+    Floats points(object, "points", {3}), limits(maxDistance, "max_distance", {}, Range::positiveOrInfinite);
+    const bool one = limits.shape().empty();
+    const Shape shape = one ? points.shape() : broadcast({&points, &limits});
     std::vector<ClosestPoint> answers(points.points().size());
     answerInParts(answers.size(), part, [&](std::size_t begin, std::size_t end) {
-        field.closest(points.points().subspan(begin, end - begin), std::span(answers).subspan(begin, end - begin),
-                      maxDistance);
+        const auto reach = limits.as<float>();
+        const auto found = std::span(answers).subspan(begin, end - begin);
+        closestOf(field, points.points().subspan(begin, end - begin), one ? reach : reach.subspan(begin, end - begin),
+                  found);
+        clearMissing(found);
     });
-    const Records<ClosestPoint> records(std::move(answers), points.shape());
+    const Records<ClosestPoint> records(std::move(answers), shape);
     return result("ClosestPoints", records.member(&ClosestPoint::distance), records.member(&ClosestPoint::position),
                   records.member(&ClosestPoint::normal), records.member(&ClosestPoint::triangle),
                   records.member(&ClosestPoint::feature), records.member(&ClosestPoint::index),
@@ -171,15 +190,27 @@ py::object overlapsBox(const FieldObject& field, const py::object& centres, cons
     });
 }
 
-FieldObject makeField(const LevelSet& levelSet, const py::object& mesh, const std::string& storage) {
+FieldObject makeField(const py::object& levelSet, const py::object& mesh, const std::string& storage,
+                      bool keepLevelSet) {
+    requireOrder(levelSet, mesh, "Field(level_set, mesh)");
+    const auto& distances = argument<const LevelSet&>(levelSet, "level_set");
     const FieldOptions options{byWord(storages, storage, "storage")};
-    const SharedMesh shared = mesh.is_none() ? nullptr : meshOf(mesh);
-    const py::tuple recipe = py::make_tuple(py::type::of<FieldObject>(), py::make_tuple(levelSet, shared, storage));
+    const SharedMesh shared = mesh.is_none() ? nullptr : meshOf(mesh, "mesh");
     const auto make = [&] {
         const py::gil_scoped_release release;
-        return shared ? Field(levelSet, *shared, options) : Field(levelSet, options);
+        return shared ? Field(distances, *shared, options) : Field(distances, options);
     };
-    return {make(), recipe};
+    FieldObject field{make(), py::tuple(), distances.origin()};
+    if (keepLevelSet) {
+        field.recipe = py::make_tuple(py::type::of<FieldObject>(), py::make_tuple(distances, shared, storage));
+        field.keptBytes = distances.memoryBytes();
+    }
+    return field;
+}
+
+py::tuple reduced(const FieldObject& field) {
+    if (field.recipe.empty()) throw py::type_error("a Field made with keep_level_set=False cannot be pickled");
+    return field.recipe;
 }
 
 py::object meshOfField(const FieldObject& field) {
@@ -193,155 +224,25 @@ py::object meshOfField(const FieldObject& field) {
     return py::cast(copy);
 }
 
-constexpr const char* fieldDoc = R"(Field(level_set, mesh=None, storage="float32")
-
-A level set laid out for queries, from any number of threads. With its mesh, closest points, rays and inside tests are
-exact; without it they follow the trilinear interpolant. Large batches run on all cores, and Ctrl-C cancels them.
-Pickles hold the level set and the mesh.
-
-mesh: the Mesh that the level set was built from, or None.
-storage: "float32", or "fixed16" for half the memory and an error below 5e-5 voxels.
-
-Arguments are arrays of any real dtype, or nested lists. Points may have any leading shape: (3,), (N, 3), (H, W, 3), and
-results have the same. Coordinates are relative to LevelSet.origin. Results are arrays that share one buffer: use
-numpy.ascontiguousarray() where a contiguous one is needed.
-
-Raises ValueError if the level set belongs to another mesh. Queries raise ValueError that names the argument for a wrong
-shape or dtype, and for a value that is not finite.
-
->>> import bilayer
->>> box = bilayer.box((2, 2, 2))
->>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
->>> field.sample([[1.1, 0, 0], [0.9, 0, 0]]).distance.round(3).tolist()
-[0.10000000149011612, -0.10000000149011612]
-)";
-
-constexpr const char* sampleDoc = R"(sample(points) -> Samples(distance, gradient, in_band)
-
-Trilinear samples. points: (..., 3).
-
-distance: float32 (...); outside the band a bound with the right sign.
-gradient: float32 (..., 3), of length near 1; zero outside the band.
-in_band: bool (...), whether all eight voxels around the point are in the band.
-
->>> import bilayer
->>> field = bilayer.Field(bilayer.build(bilayer.box((2, 2, 2)), resolution=32))
->>> field.sample([1.1, 0, 0]).gradient.round(3).tolist()
-[1.0, 0.0, 0.0]
-)";
-
-constexpr const char* closestDoc = R"(closest(points, max_distance=inf) -> ClosestPoints
-
-The closest point of the surface, from any distance. points: (..., 3).
-
-distance: float32 (...), negative inside.
-position, normal: float32 (..., 3).
-triangle: int32 (...), index of the face; -1 without a mesh.
-feature: uint8 (...): 0 face, 1 edge, 2 vertex; feature_index: uint8 (...), of that edge or corner in the face.
-found: bool (...), False where the surface is farther than max_distance; the other members are then invalid.
-
->>> import bilayer
->>> box = bilayer.box((2, 2, 2))
->>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
->>> float(field.closest([5, 0.1, 0.2]).distance)
-4.0
-)";
-
-constexpr const char* raycastDoc =
-    R"(raycast(origins, directions, max_distance=inf) -> Hits(hit, distance, position, normal, triangle)
-
-The first point of each ray inside the solid. Arguments are broadcast against each other.
-
-origins, directions: (..., 3); directions of any non-zero length.
-max_distance: (...), 0 or above.
-hit: bool (...); distance: float32 (...), inf without a hit; position, normal: float32 (..., 3), nan without a hit;
-triangle: int32 (...), -1 where there is none.
-
->>> import bilayer
->>> box = bilayer.box((2, 2, 2))
->>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
->>> field.raycast([5, 0, 0], [[-1, 0, 0], [1, 0, 0]]).distance.tolist()
-[4.0, inf]
-)";
-
-constexpr const char* sphereCastDoc = R"(sphere_cast(origins, directions, radii, max_distance=inf) -> Hits
-
-The first contact of a sphere that moves along each ray; as raycast(). distance is the path length of its centre.
-
-radii: (...), 0 or above.
-
->>> import bilayer
->>> box = bilayer.box((2, 2, 2))
->>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
->>> round(float(field.sphere_cast([5, 0, 0], [-1, 0, 0], 0.5).distance), 4)
-3.5
-)";
-
-constexpr const char* insideDoc = R"(inside(points) -> bool (...)
-
-Whether points (..., 3) are inside; exact with the mesh.
-
->>> import bilayer
->>> box = bilayer.box((2, 2, 2))
->>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
->>> field.inside([[0, 0, 0.99], [0, 0, 1.01]]).tolist()
-[True, False]
-)";
-
-constexpr const char* segmentDoc = R"(segment(start, end) -> Hits
-
-As raycast(), along segments between points (..., 3). distance is the path length from the start.
-
->>> import bilayer
->>> box = bilayer.box((2, 2, 2))
->>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
->>> field.segment([5, 0, 0], [[0, 0, 0], [2, 0, 0]]).hit.tolist()
-[True, False]
-)";
-
-constexpr const char* overlapsSphereDoc = R"(overlaps_sphere(centres, radii) -> bool (...)
-
-Whether spheres and the solid overlap. centres: (..., 3); radii: (...), 0 or above.
-
->>> import bilayer
->>> box = bilayer.box((2, 2, 2))
->>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
->>> field.overlaps_sphere([2, 0, 0], [0.9, 1.1]).tolist()
-[False, True]
-)";
-
-constexpr const char* overlapsBoxDoc = R"(overlaps_box(centres, half_sizes, rotations=None) -> bool (...)
-
-Whether boxes and the solid overlap. centres, half_sizes: (..., 3), half sizes 0 or above; rotations: unit quaternions
-w, x, y, z (..., 4), or None.
-
->>> import bilayer
->>> box = bilayer.box((2, 2, 2))
->>> field = bilayer.Field(bilayer.build(box, resolution=32), box)
->>> field.overlaps_box([2, 0, 0], [[0.9, 1, 1], [1.1, 1, 1]]).tolist()
-[False, True]
-)";
-
 }  // namespace
 
 void addField(py::module_& module) {
-    py::class_<FieldObject>(module, "Field", fieldDoc)
-        .def(py::init(&makeField), py::arg("level_set"), py::arg("mesh") = py::none(), py::arg("storage") = "float32")
-        .def("sample", sample, py::arg("points"), sampleDoc)
-        .def("closest", closest, py::arg("points"), py::arg("max_distance") = std::numeric_limits<float>::infinity(),
-             closestDoc)
-        .def("inside", inside, py::arg("points"), insideDoc)
-        .def("raycast", raycast, py::arg("origins"), py::arg("directions"),
-             py::arg("max_distance") = std::numeric_limits<float>::infinity(), raycastDoc)
-        .def("sphere_cast", sphereCast, py::arg("origins"), py::arg("directions"), py::arg("radii"),
-             py::arg("max_distance") = std::numeric_limits<float>::infinity(), sphereCastDoc)
-        .def("segment", segment, py::arg("start"), py::arg("end"), segmentDoc)
-        .def("overlaps_sphere", overlapsSphere, py::arg("centres"), py::arg("radii"), overlapsSphereDoc)
-        .def("overlaps_box", overlapsBox, py::arg("centres"), py::arg("half_sizes"), py::arg("rotations") = py::none(),
-             overlapsBoxDoc)
-        .def_property_readonly(
+    py::class_<FieldObject> type(module, "Field", fieldDoc);
+    defineConstructor(type, fieldDoc, makeField);
+    defineMethod(type, sampleDoc, sample);
+    defineMethod(type, closestDoc, closest);
+    defineMethod(type, insideDoc, inside);
+    defineMethod(type, raycastDoc, raycast);
+    defineMethod(type, sphereCastDoc, sphereCast);
+    defineMethod(type, segmentDoc, segment);
+    defineMethod(type, overlapsSphereDoc, overlapsSphere);
+    defineMethod(type, overlapsBoxDoc, overlapsBox);
+    type.def_property_readonly(
             "voxel_size", [](const FieldObject& self) { return self.voxelSize(); },
             "Edge of a voxel, in the mesh's unit.")
+        .def_property_readonly(
+            "origin", [](const FieldObject& self) { return toArray(self.origin); },
+            "float64 of shape (3,): LevelSet.origin. Points of the world minus this are those of queries.")
         .def_property_readonly(
             "exterior_width", [](const FieldObject& self) { return self.exteriorWidth(); },
             "Width of the band outside.")
@@ -349,11 +250,13 @@ void addField(py::module_& module) {
             "interior_width", [](const FieldObject& self) { return self.interiorWidth(); }, "Width of the band inside.")
         .def_property_readonly(
             "bounds", [](const FieldObject& field) { return toArray(field.bounds()); },
-            "float32 of shape (2, 3): of all points in the band.")
+            "float32 of shape (2, 3): lower and upper corner of the band, relative to `origin`.")
         .def_property_readonly("mesh", meshOfField, "A copy of the mesh, with faces outward; None without one.")
         .def_property_readonly(
-            "memory_bytes", [](const FieldObject& self) { return self.memoryBytes(); }, "Of samples and mesh.")
-        .def("__reduce__", [](const FieldObject& self) { return self.recipe; })
+            "memory_bytes", [](const FieldObject& self) { return self.memoryBytes() + self.keptBytes; },
+            "Memory of the samples, the mesh and its hierarchies, and of the level set that is kept for pickles, in "
+            "bytes.")
+        .def("__reduce__", reduced)
         .def("__copy__", [](const FieldObject& self) { return self; })
         .def(
             "__deepcopy__", [](const FieldObject& self, const py::dict&) { return self; }, py::arg("memo"))

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include <bilayer/integration/fluid/obstacle.h>
@@ -17,6 +18,7 @@
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
 #include "integration/python/cancellable.h"
+#include "integration/python/define.h"
 #include "integration/python/grid_bytes.h"
 #include "integration/python/objects.h"
 #include "sdf/base/openvdb.h"
@@ -32,6 +34,8 @@ constexpr std::array<std::pair<const char*, fluid::SeedMode>, 3> modes{{{"unite"
 
 fluid::Placement placementOf(const py::object& pose, const py::object& scale) {
     Floats factors(scale, "scale", {}, Range::nonNegative);
+    if (!factors.shape().empty() && factors.shape() != Shape{3})
+        throw std::invalid_argument("scale: expected one number or three, got shape " + text(factors.shape()));
     factors.broadcast({3});
     const auto f = factors.as<float>();
     for (const float factor : f) requirePositive(double(factor), "scale");
@@ -49,9 +53,9 @@ void dropHistory(openvdb::FloatGrid& liquid) {
 // A LevelSet, or a mesh of any kind.
 class SolidArgument {
   public:
-    explicit SolidArgument(const py::object& solid)
+    SolidArgument(const py::object& solid, const char* name)
         : levelSet_(py::isinstance<LevelSet>(solid) ? solid.cast<const LevelSet*>() : nullptr),
-          mesh_(levelSet_ ? nullptr : meshOf(solid)) {}
+          mesh_(levelSet_ ? nullptr : meshOf(solid, name)) {}
 
     /// visit(LevelSet) or visit(Mesh); needs no GIL.
     template <class Visit>
@@ -68,7 +72,7 @@ py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::
                       const std::string& mode, bool uniteSolids) {
     const fluid::Placement placement = placementOf(pose, scale);
     fluid::SeedOptions options(byWord(modes, mode, "mode"), uniteSolids);
-    const SolidArgument solid(body);
+    const SolidArgument solid(body, "body");
     openvdb::FloatGrid::Ptr grid;
     const auto [maxChange, where, changedVoxels] = cancellable(py::none(), [&](const Listener& listener) {
         options.progress = listener;
@@ -82,24 +86,23 @@ py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::
 }
 
 py::object makeParticles(const py::object& liquid, const py::object& pose, const py::object& scale,
-                         const py::object& voxelSize, int perVoxel, std::uint64_t seed) {
+                         std::optional<double> voxelSize, int perVoxel, std::uint64_t seed) {
     fluid::ParticleOptions options{.perVoxel = perVoxel, .seed = seed};
     std::function<fluid::Particles()> make;
     if (py::isinstance<LevelSet>(liquid)) {
-        if (!pose.is_none() || !voxelSize.is_none())
-            throw std::invalid_argument("pose and voxel_size are for a Field; a LevelSet has its own voxels");
+        if (!pose.is_none() || voxelSize)
+            throw std::invalid_argument("pose, voxel_size: expected None with a LevelSet, which has its own voxels");
         const auto& levelSet = liquid.cast<const LevelSet&>();
         make = [&] { return fluid::particles(*levelSet.grids().distance, options); };
     } else if (py::isinstance<FieldObject>(liquid)) {
         const auto& field = liquid.cast<const FieldObject&>();
-        const double edge = voxelSize.is_none() ? double(field.voxelSize()) : voxelSize.cast<double>();
+        const double edge = voxelSize.value_or(double(field.voxelSize()));
         requirePositive(edge, "voxel_size");
         make = [&options, &field, placement = placementOf(pose, scale), edge] {
             return fluid::particles(field, placement, *Transform::createLinearTransform(edge), options);
         };
     } else {
-        throw std::invalid_argument(
-            fmt::format("liquid: expected a LevelSet or a Field, got a '{}'", Py_TYPE(liquid.ptr())->tp_name));
+        refuseType("liquid", "a LevelSet or a Field", liquid);
     }
     fluid::Particles particles = cancellable(py::none(), [&](const Listener& listener) {
         options.progress = listener;
@@ -145,10 +148,13 @@ class Obstacle {
         return values;
     }
 
-    void save(const py::object& path) const {
-        const std::string file = pathOf(path);
+    void save(const Path& path) const {
         const py::gil_scoped_release release;
-        writeGrids(file, grids());
+        writeGrids(path.text, grids());
+    }
+    std::string text() const {
+        const openvdb::Coord size = box_.dim();
+        return fmt::format("Obstacle({} x {} x {} cells of {:g})", size.x(), size.y(), size.z(), voxelSize());
     }
 
   private:
@@ -162,7 +168,7 @@ Obstacle makeObstacle(const py::object& solid, double voxelSize, const py::objec
     const fluid::Placement placement = placementOf(pose, scale);
     fluid::SolidOptions options{.velocity = {vector(velocity, "velocity"), vector(angularVelocity, "angular_velocity")},
                                 .halfWidthVoxels = halfWidth};
-    const SolidArgument body(solid);
+    const SolidArgument body(solid, "solid");
     return cancellable(py::none(), [&](const Listener& listener) {
         options.progress = listener;
         openvdb::initialize();
@@ -190,9 +196,6 @@ liquid: a LevelSet with a band of 3 voxels or more on each side.
 body: a mesh or a LevelSet. pose: a Pose, a matrix of shape (4, 4), or None. scale: one number or three, above 0.
 mode: "unite", "intersect" or "subtract". unite_solids: ignore walls inside overlapping solids of the mesh.
 
-liquid: the new LevelSet. max_change_voxels: float, by which distances were changed near creases; where: float64 (3,),
-the voxel; changed_voxels: int, voxels that changed by more than 0.1 voxels.
-
 Raises ValueError for a body that is open or without an inside, and for a liquid that is no level set.
 
 >>> import bilayer
@@ -211,6 +214,9 @@ Ctrl-C cancels.
 liquid: a LevelSet, or a Field in a pose, whose mesh keeps particles from passing thin walls.
 voxel_size: of the solver's grid, for a Field; None for the field's own.
 per_voxel: particles in a voxel that is entirely inside, 1 to 1000.
+seed: an integer from 0 to 2^64 - 1.
+
+Raises ValueError that names the argument for a type or value that is not listed above.
 
 >>> import bilayer
 >>> points = bilayer.particles(bilayer.build(bilayer.box(), resolution=16))
@@ -226,7 +232,8 @@ What a pressure solver needs of a moving body, in cells whose centres are at who
 Ctrl-C cancels.
 
 solid: a mesh or a LevelSet. pose, scale: as for seed().
-velocity: [unit/s]. angular_velocity: [rad/s], about the pose's position.
+velocity: of the pose's position, in units per second. angular_velocity: about that, in radians per second.
+half_width_voxels: width of the band of `distance` on each side, 3 to 1000.
 
 Raises ValueError for a body that is open or without an inside.
 
@@ -248,10 +255,11 @@ Writes the four grids to a .vdb file, whole or not at all. Raises RuntimeError i
 }  // namespace
 
 void addFluid(py::module_& module) {
-    py::class_<Obstacle>(
+    py::class_<Obstacle> type(
         module, "Obstacle",
-        "A moving body in a solver's grid; obstacle() makes it. Arrays are dense over one box of cells.")
-        .def_property_readonly(
+        "A moving body in a solver's grid; obstacle() makes it. Arrays are dense over one box of cells.");
+    defineMethod(type, saveDoc, [](const Obstacle& self, const Path& path) { self.save(path); });
+    type.def_property_readonly(
             "distance", [](const Obstacle& self) { return self.dense(*self.solid().distance); },
             "float32 (nx, ny, nz): level set at the cell centres, negative inside the body.")
         .def_property_readonly(
@@ -267,18 +275,14 @@ void addFluid(py::module_& module) {
             "origin", [](const Obstacle& self) { return toArray(self.origin()); },
             "float64 (3,): world coordinates of the centre of cell [0, 0, 0].")
         .def_property_readonly("voxel_size", &Obstacle::voxelSize, "Edge of a cell.")
-        .def("save", &Obstacle::save, py::arg("path"), saveDoc)
+        .def("__repr__", &Obstacle::text)
         .def("__copy__", [](const Obstacle& self) { return self; })
         .def(
             "__deepcopy__", [](const Obstacle& self, const py::dict&) { return self; }, py::arg("memo"))
         .def(py::pickle([](const Obstacle& self) { return bytesOf(self.grids()); }, &restored));
-    module.def("seed", seedLiquid, py::arg("liquid"), py::arg("body"), py::arg("pose") = py::none(),
-               py::arg("scale") = 1, py::arg("mode") = "unite", py::arg("unite_solids") = true, seedDoc);
-    module.def("particles", makeParticles, py::arg("liquid"), py::arg("pose") = py::none(), py::arg("scale") = 1,
-               py::arg("voxel_size") = py::none(), py::arg("per_voxel") = 8, py::arg("seed") = 0, particlesDoc);
-    module.def("obstacle", makeObstacle, py::arg("solid"), py::arg("voxel_size"), py::arg("pose") = py::none(),
-               py::arg("scale") = 1, py::arg("velocity") = py::make_tuple(0, 0, 0),
-               py::arg("angular_velocity") = py::make_tuple(0, 0, 0), py::arg("half_width_voxels") = 3.f, obstacleDoc);
+    define(module, seedDoc, seedLiquid);
+    define(module, particlesDoc, makeParticles);
+    define(module, obstacleDoc, makeObstacle);
 }
 
 }  // namespace bilayer::python

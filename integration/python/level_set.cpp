@@ -19,6 +19,7 @@
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
+#include "integration/python/define.h"
 #include "integration/python/dense.h"
 #include "integration/python/grid_bytes.h"
 #include "sdf/base/openvdb.h"
@@ -29,11 +30,6 @@ namespace {
 using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
-
-glm::dvec3 worldOf(const LevelSet& levelSet, const Coord& voxel) {
-    const openvdb::Vec3d place = levelSet.grids().distance->indexToWorld(voxel);
-    return levelSet.origin() + glm::dvec3(place.x(), place.y(), place.z());
-}
 
 // The tree with voxels in place of active tiles, which fields of other programs may have.
 FloatTree::ConstPtr withoutTiles(const FloatGrid& grid) {
@@ -89,8 +85,7 @@ py::object sparse(const LevelSet& levelSet) {
     py::object triangles = py::none();
     if (levelSet.grids().triangle) triangles = arrayOf(std::move(voxels.triangles), {count});
     return result("Sparse", arrayOf(std::move(voxels.coordinates), {count, 3}),
-                  arrayOf(std::move(voxels.values), {count}), triangles, toArray(worldOf(levelSet, Coord(0))),
-                  levelSet.voxelSize());
+                  arrayOf(std::move(voxels.values), {count}), triangles, toArray(glm::dvec3(0)), levelSet.voxelSize());
 }
 
 py::dict metadataOf(const LevelSet& levelSet) {
@@ -148,8 +143,8 @@ bool equal(const LevelSet& a, const LevelSet& b) {
     return one.coordinates == other.coordinates && one.values == other.values && one.triangles == other.triangles;
 }
 
-void save(const LevelSet& levelSet, const py::object& path, bool halfFloat) {
-    const std::string file = pathOf(path);
+void save(const LevelSet& levelSet, const Path& path, bool halfFloat) {
+    const std::string& file = path.text;
     const bool nano = file.ends_with(".nvdb");
     if (!nano && !file.ends_with(".vdb"))
         throw std::invalid_argument(fmt::format("path: expected a name that ends in .vdb or .nvdb, got '{}'", file));
@@ -158,10 +153,10 @@ void save(const LevelSet& levelSet, const py::object& path, bool halfFloat) {
     nano ? writeNanoVdb(file, levelSet) : writeVdb(file, levelSet, {.halfFloat = halfFloat});
 }
 
-LevelSet load(const py::object& path) {
-    const std::string file = existingFile(path);
+LevelSet load(const Path& path) {
+    requireExisting(path);
     const py::gil_scoped_release release;
-    return readVdb(file);
+    return readVdb(path.text);
 }
 
 SharedMesh extract(const LevelSet& levelSet, float isovalue, float adaptivity) {
@@ -176,8 +171,9 @@ LevelSet extended(const LevelSet& levelSet, std::optional<float> distance) {
 
 constexpr const char* levelSetDoc = R"(An immutable narrow-band signed distance field, in an OpenVDB grid.
 
-build() makes it, LevelSet.load() reads it. Distances are negative inside, in the mesh's unit. Voxel centres lie at
-whole multiples of the voxel size from Mesh.origin. Copies share memory; pickles hold all grids.
+build() makes it, LevelSet.load() reads it. Distances are negative inside, in the mesh's unit. Coordinates are those of
+Mesh.vertices; add `origin` for the world's. Voxel centres are at whole multiples of the voxel size. Copies share
+memory; pickles hold all grids.
 
 >>> import bilayer, pickle
 >>> level_set = bilayer.build(bilayer.box(), resolution=16)
@@ -191,10 +187,10 @@ The field as a dense array over the band's bounding box.
 
 padding: voxels added on each side.
 values: float32 of shape (nx, ny, nz). Outside the band: the exterior width outside, minus the interior width inside.
-origin: float64 of shape (3,), world coordinates of the centre of values[0, 0, 0].
+origin: float64 of shape (3,), the centre of values[0, 0, 0]; relative to LevelSet.origin, as the points of queries.
 spacing: the voxel size. values[i, j, k] is at origin + spacing * (i, j, k).
 
-Raises ValueError for more than 2^31 voxels.
+Raises ValueError for a negative padding, and for more than 2^31 voxels.
 
 >>> import bilayer
 >>> values, origin, spacing = bilayer.build(bilayer.box(), resolution=16).to_numpy()
@@ -208,10 +204,11 @@ constexpr const char* fromDenseDoc =
 The level set of a dense array of signed distances, as to_numpy() returns it. Voxels beyond the band are dropped.
 
 values: real numbers of shape (nx, ny, nz), negative inside, in the unit of the spacing.
-origin: three numbers, the centre of values[0, 0, 0]. spacing: distance of neighbouring voxels, above 0.
+origin: three numbers, the centre of values[0, 0, 0], at a whole number of voxels from zero.
+spacing: distance of neighbouring voxels, above 0.
 half_width: width of the band in the unit of the spacing, or a pair for outside and inside; None for the smallest value
 at the border of the array, and minus the smallest value.
-field_origin: LevelSet.origin, to which queries are relative; `origin` must be a whole number of voxels from it.
+field_origin: LevelSet.origin: what to add to coordinates of the level set for those of the world.
 
 Raises ValueError that names the argument for a wrong shape or dtype and values that are not finite; if no value is
 negative; if the solid or the band reaches the border; and for values that are no distances: that differ by more than
@@ -227,9 +224,11 @@ constexpr const char* sparseDoc = R"(sparse() -> Sparse(coordinates, values, tri
 
 The active voxels, in the order of the tree.
 
-coordinates: int32 of shape (N, 3), the voxels' indices. The centre of a voxel is at origin + spacing * coordinates.
+coordinates: int32 of shape (N, 3), the voxels' indices. The centre of a voxel is at origin + spacing * coordinates,
+relative to LevelSet.origin.
 values: float32 of shape (N,), signed distances.
 triangles: int32 of shape (N,), the nearest face; None unless build() was asked for triangles.
+origin: float64 of shape (3,), zero. spacing: the voxel size.
 
 >>> import bilayer
 >>> level_set = bilayer.build(bilayer.box(), resolution=16)
@@ -282,7 +281,7 @@ constexpr const char* loadDoc = R"(load(path) -> LevelSet
 
 Reads the first level set of a .vdb file, of bilayer or another program.
 
-Raises FileNotFoundError, and RuntimeError that names the file if it cannot be read.
+Raises FileNotFoundError if there is no such file, and RuntimeError that names the file if it cannot be read.
 
 >>> import bilayer, os, tempfile
 >>> with tempfile.TemporaryDirectory() as folder:
@@ -295,19 +294,29 @@ Raises FileNotFoundError, and RuntimeError that names the file if it cannot be r
 }  // namespace
 
 void addLevelSet(py::module_& module) {
-    py::class_<LevelSet>(module, "LevelSet", levelSetDoc)
-        .def_property_readonly("voxel_size", &LevelSet::voxelSize, "Edge of a voxel, in the mesh's unit.")
+    py::class_<LevelSet> type(module, "LevelSet", levelSetDoc);
+    defineMethod(type, denseDoc, toDense);
+    defineStatic(type, fromDenseDoc, fromDense);
+    defineMethod(type, sparseDoc, sparse);
+    defineMethod(type, surfaceDoc, extract);
+    defineMethod(type, extendedDoc, extended);
+    defineMethod(type, saveDoc, save);
+    defineStatic(type, loadDoc, load);
+    type.def_property_readonly("voxel_size", &LevelSet::voxelSize, "Edge of a voxel, in the mesh's unit.")
         .def_property_readonly(
             "origin", [](const LevelSet& self) { return toArray(self.origin()); },
-            "float64 of shape (3,): Mesh.origin. Queries use coordinates relative to it.")
+            "float64 of shape (3,): Mesh.origin. World coordinates minus this are those of queries.")
         .def_property_readonly("exterior_width", &LevelSet::exteriorWidth,
                                "Voxels with 0 <= distance < this are active.")
         .def_property_readonly("interior_width", &LevelSet::interiorWidth,
                                "Voxels with -this < distance < 0 are active.")
         .def_property_readonly("active_voxels", &LevelSet::activeVoxels, "Number of voxels in the band.")
-        .def_property_readonly("memory_bytes", &LevelSet::memoryBytes, "Of all grids.")
+        .def_property_readonly("memory_bytes", &LevelSet::memoryBytes, "Memory that all grids take, in bytes.")
         .def_property_readonly("method", &LevelSet::method, "How distances were computed; '' if not known.")
-        .def_property_readonly("sign", &LevelSet::sign, "How the inside was found; '' if not known.")
+        .def_property_readonly("sign", &LevelSet::sign,
+                               "How the inside was found: 'normals', 'winding' or 'flood'; 'layers' for the method "
+                               "'double-layer', and 'prisms' for 'prism', which have signs of their own; '' if not "
+                               "known.")
         .def_property_readonly("sign_reason", &LevelSet::signReason, "Why that sign method was chosen.")
         .def_property_readonly("error_bound", &LevelSet::errorBound,
                                "Maximum error of active voxels; inf: not bounded; nan: not known.")
@@ -316,15 +325,6 @@ void addLevelSet(py::module_& module) {
             "has_triangles", [](const LevelSet& self) { return self.grids().triangle != nullptr; },
             "Whether the nearest face of each active voxel is stored.")
         .def_property_readonly("metadata", metadataOf, "All of the above, and more, by name.")
-        .def("to_numpy", toDense, py::arg("padding") = 1, denseDoc)
-        .def_static("from_numpy", fromDense, py::arg("values"), py::arg("origin") = py::make_tuple(0, 0, 0),
-                    py::arg("spacing") = 1.0, py::kw_only(), py::arg("half_width") = py::none(),
-                    py::arg("field_origin") = py::make_tuple(0, 0, 0), fromDenseDoc)
-        .def("sparse", sparse, sparseDoc)
-        .def("surface", extract, py::arg("isovalue") = 0.f, py::arg("adaptivity") = 0.f, surfaceDoc)
-        .def("extended", extended, py::arg("distance") = py::none(), extendedDoc)
-        .def("save", save, py::arg("path"), py::arg("half_float") = false, saveDoc)
-        .def_static("load", load, py::arg("path"), loadDoc)
         .def(
             "__eq__",
             [](const LevelSet& a, const LevelSet& b) {

@@ -14,6 +14,7 @@
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
 #include "integration/python/cancellable.h"
+#include "integration/python/define.h"
 
 namespace bilayer::python {
 namespace {
@@ -21,15 +22,19 @@ namespace {
 /// Above this ratio of distance from zero to size, float32 rounds coordinates by more than 6e-5 of the size.
 constexpr double farSizes = 1000;
 
-// Refuses double coordinates that float32 cannot hold next to the size of the mesh.
-void requireNear(const py::object& vertices) {
-    const py::array array = py::array::ensure(vertices);
-    if (array.size() == 0 || array.dtype().itemsize() < py::ssize_t(sizeof(double)) || array.dtype().kind() != 'f')
-        return;
-    const py::object lower = array.attr("min")(0), upper = array.attr("max")(0);
-    const double size = (upper - lower).attr("max")().cast<double>();
-    const double far = std::max(lower.attr("__abs__")().attr("max")().cast<double>(),
-                                upper.attr("__abs__")().attr("max")().cast<double>());
+// Refuses coordinates that float32 cannot hold next to the size of the mesh. Those of floats are as the caller has
+// them.
+void requireNear(const py::array& vertices) {
+    const bool isFloat = vertices.dtype().kind() == 'f' && vertices.dtype().itemsize() <= py::ssize_t(sizeof(float));
+    if (vertices.size() == 0 || isFloat) return;
+    // Python's integers do not overflow, and differ where their doubles are equal
+    const py::list lower = vertices.attr("min")(0).attr("tolist")(), upper = vertices.attr("max")(0).attr("tolist")();
+    double size = 0, far = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const py::object low = lower[axis], high = upper[axis];
+        size = std::max(size, py::float_(high - low).cast<double>());
+        far = std::max({far, std::abs(py::float_(low).cast<double>()), std::abs(py::float_(high).cast<double>())});
+    }
     if (size > 0 && far > farSizes * size)
         throw std::invalid_argument(
             fmt::format("vertices: the mesh is {:.6g} long and {:.6g} from zero, where float32 rounds it: subtract an "
@@ -37,20 +42,17 @@ void requireNear(const py::object& vertices) {
                         size, far));
 }
 
-Mesh makeMesh(const py::object& vertices, const py::object& faces, const py::object& origin) {
-    const Floats points(vertices, "vertices", {3});
-    if (points.shape().size() != 1)
-        throw std::invalid_argument(fmt::format(
-            "vertices: expected an array of real numbers of shape (N, 3), got {} points", text(points.shape())));
-    requireNear(vertices);
+SharedMesh makeMesh(const py::object& vertices, const py::object& faces, const py::object& origin) {
+    const Floats points(vertices, "vertices", {3}, Range::finite, Items::list);
+    requireNear(py::array::ensure(vertices));
     const auto span = points.points();
     const std::vector<std::uint32_t> corners = indices(faces, "faces", 3, span.size(), "a vertex");
-    Mesh mesh;
-    if (!origin.is_none()) mesh.origin = doubleVector(origin, "origin");
+    const auto mesh = std::make_shared<Mesh>();
+    if (!origin.is_none()) mesh->origin = doubleVector(origin, "origin");
     const py::gil_scoped_release release;
-    mesh.points.assign(span.begin(), span.end());
-    mesh.triangles.resize(corners.size() / 3);
-    if (!corners.empty()) std::memcpy(mesh.triangles.data(), corners.data(), corners.size() * sizeof(std::uint32_t));
+    mesh->points.assign(span.begin(), span.end());
+    mesh->triangles.resize(corners.size() / 3);
+    if (!corners.empty()) std::memcpy(mesh->triangles.data(), corners.data(), corners.size() * sizeof(std::uint32_t));
     return mesh;
 }
 
@@ -60,8 +62,7 @@ bool equal(const Mesh& a, const Mesh& b) {
 }
 
 SharedMesh transform(const Mesh& mesh, const py::object& matrix) {
-    const Floats numbers(matrix, "matrix", {4, 4});
-    if (!numbers.shape().empty()) throw std::invalid_argument("matrix: expected one matrix of shape (4, 4)");
+    const Floats numbers(matrix, "matrix", {4, 4}, Range::finite, Items::one);
     const auto values = numbers.as<float>();
     if (values[12] != 0 || values[13] != 0 || values[14] != 0 || values[15] != 1)
         throw std::invalid_argument("matrix: expected an affine map, whose last row is 0 0 0 1");
@@ -101,36 +102,37 @@ py::object toReport(const MeshReport& r) {
     return py::module_::import("bilayer.results").attr("MeshReport")(**fields);
 }
 
-py::object inspectMesh(const py::object& object, double wall) {
-    const SharedMesh mesh = meshOf(object);
-    if (!(wall >= 0) || !std::isfinite(wall))
-        throw std::invalid_argument(fmt::format("wall is {}, and must be 0 or above", wall));
-    return toReport(
-        cancellable(py::none(), [&](const Listener& listener) { return inspect(*mesh, float(wall), listener); }));
+py::object inspectMesh(const SharedMesh& mesh, float wall) {
+    requireNotNegative(double(wall), "wall");
+    return toReport(cancellable(py::none(), [&](const Listener& listener) { return inspect(*mesh, wall, listener); }));
 }
 
-SharedMesh read(const py::object& path) {
-    const std::string file = existingFile(path);
+SharedMesh read(const Path& path) {
+    requireExisting(path);
     const py::gil_scoped_release release;
-    return std::make_shared<Mesh>(readMesh(file));
+    return std::make_shared<Mesh>(readMesh(path.text));
 }
 
-void write(const Mesh& mesh, const py::object& path) {
-    const std::string file = pathOf(path);
+void write(const Mesh& mesh, const Path& path) {
     const py::gil_scoped_release release;
-    writeMesh(file, mesh);
+    writeMesh(path.text, mesh);
+}
+
+SharedMesh weldedMesh(const Mesh& mesh) {
+    const py::gil_scoped_release release;
+    return std::make_shared<Mesh>(weld(mesh));
 }
 
 constexpr const char* meshDoc = R"(Mesh(vertices, faces, origin=None)
 
 An immutable triangle mesh. Faces are counter-clockwise seen from outside.
 
-vertices: real numbers of shape (N, 3), kept as float32, in the mesh's unit.
-faces: integers of shape (M, 3), indices of vertices.
-origin: three numbers; world coordinates are vertices plus origin. Fields of the mesh use coordinates relative to it.
+vertices: real numbers of shape (N, 3), copied as float32, in the mesh's unit.
+faces: integers of shape (M, 3), indices of vertices; copied.
+origin: three numbers. World coordinates are vertices plus origin. Everything else uses the coordinates of the vertices.
 
 Raises ValueError that names the argument for a wrong shape or dtype, a value that is not finite, and an index out of
-range; also for float64 coordinates so far from zero that float32 would round the shape.
+range; also for float64 and integer coordinates so far from zero that float32 would round the shape.
 
 >>> import bilayer
 >>> faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
@@ -155,7 +157,8 @@ Raises ValueError for a mesh without faces.
 constexpr const char* readDoc = R"(read_mesh(path) -> Mesh
 
 Reads a mesh: OBJ, PLY, STL, OFF, glTF and all other formats of Assimp, by the extension. Triangulates polygons and
-merges vertices with equal coordinates. A mesh far from the world's origin gets its own origin (Mesh.origin).
+merges vertices with equal coordinates. A mesh far from zero is moved to zero, and Mesh.origin says by how much: queries
+then take points - mesh.origin.
 
 Raises FileNotFoundError, RuntimeError that names the file and line if it cannot be read, and ValueError for coordinates
 that are not finite.
@@ -203,12 +206,12 @@ Raises ValueError for another extension and RuntimeError if the file cannot be w
 }  // namespace
 
 void addMesh(py::module_& module) {
-    py::class_<Mesh, SharedMesh>(module, "Mesh", meshDoc)
-        .def(py::init([](const py::object& vertices, const py::object& faces, const py::object& origin) {
-                 return std::make_shared<Mesh>(makeMesh(vertices, faces, origin));
-             }),
-             py::arg("vertices"), py::arg("faces"), py::arg("origin") = py::none())
-        .def_property_readonly(
+    py::class_<Mesh, SharedMesh> type(module, "Mesh", meshDoc);
+    defineConstructor(type, meshDoc, makeMesh);
+    defineMethod(type, weldedDoc, weldedMesh);
+    defineMethod(type, transformedDoc, transform);
+    defineMethod(type, saveDoc, write);
+    type.def_property_readonly(
             "vertices",
             [](const py::object& self) {
                 const Mesh& mesh = self.cast<const Mesh&>();
@@ -238,15 +241,6 @@ void addMesh(py::module_& module) {
             },
             "float32 of shape (2, 3): lower and upper corner of all vertices that faces use.")
         .def(
-            "welded",
-            [](const Mesh& mesh) {
-                const py::gil_scoped_release release;
-                return std::make_shared<Mesh>(weld(mesh));
-            },
-            weldedDoc)
-        .def("transformed", transform, py::arg("matrix"), transformedDoc)
-        .def("save", write, py::arg("path"), saveDoc)
-        .def(
             "__eq__", [](const Mesh& a, const Mesh& b) { return equal(a, b); }, py::is_operator())
         .def("__hash__",
              [](const Mesh& mesh) {
@@ -264,8 +258,8 @@ void addMesh(py::module_& module) {
             return py::make_tuple(self.get_type(),
                                   py::make_tuple(self.attr("vertices"), self.attr("faces"), self.attr("origin")));
         });
-    module.def("read_mesh", read, py::arg("path"), readDoc);
-    module.def("inspect", inspectMesh, py::arg("mesh"), py::arg("wall") = 0.0, inspectDoc);
+    define(module, readDoc, read);
+    define(module, inspectDoc, inspectMesh);
 }
 
 }  // namespace bilayer::python

@@ -13,12 +13,15 @@ namespace bilayer::python {
 namespace py = pybind11;
 
 struct FieldObject : Field {
-    /// As __reduce__ returns it: a callable and a tuple of its arguments.
+    /// As __reduce__ returns it: a callable and a tuple of its arguments; empty if it keeps no level set.
     py::tuple recipe;
+    glm::dvec3 origin;        ///< of the level set: world coordinates of the coordinates' zero
+    std::size_t keptBytes{};  ///< of the level set that the recipe keeps
 };
 
 struct ColliderObject : Collider {
     py::tuple recipe;
+    glm::dvec3 origin;  ///< of the level set
 };
 
 struct ShapeObject : ContactShape {

@@ -1,32 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integration/python/placed.h"
 
-#include <fmt/format.h>
-
-#include <stdexcept>
 #include <string>
 
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
+#include "integration/python/convert.h"
 
 namespace bilayer::python {
 namespace {
 
 Motion motionOf(const py::object& object, const char* name) {
     if (object.is_none()) return {};
-    const Floats motion(object, name, {2, 3});
-    if (!motion.shape().empty())
-        throw std::invalid_argument(
-            fmt::format("{}: expected a displacement and a rotation vector, shape (2, 3), got {} of them", name,
-                        text(motion.shape())));
+    const Floats motion(object, name, {2, 3}, Range::finite, Items::one);
     return {motion.points()[0], motion.points()[1]};
 }
 
 ContactShape shapeOf(const py::object& body, const char* name) {
     if (py::isinstance<ColliderObject>(body)) return ContactShape(body.cast<const ColliderObject&>());
     if (py::isinstance<ShapeObject>(body)) return body.cast<const ShapeObject&>();
-    throw py::type_error(
-        fmt::format("{}: expected a Collider or a Shape, got a '{}'", name, Py_TYPE(body.ptr())->tp_name));
+    refuseType(name, "a Collider or a Shape", body);
 }
 
 }  // namespace

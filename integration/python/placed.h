@@ -15,7 +15,7 @@ namespace py = pybind11;
 /// A body from the arguments NAME, a Collider or a Shape, and pose_NAME, scale_NAME and motion_NAME, where NAME is "a"
 /// or "b".
 /// @param motion  a displacement and a rotation vector, shape (2, 3), or None
-/// Throws std::invalid_argument that names the argument, or a TypeError of Python.
+/// Throws std::invalid_argument that names the argument.
 PlacedShape placed(const py::object& body, const py::object& pose, float scale, const py::object& motion,
                    const char* name);
 

@@ -72,7 +72,7 @@ void FieldFiller::fillWithOwnSigns() {
     if (prism)
         signs_ = {prismSigns, "the side of the nearest triangle whose prism holds the voxel"};
     else
-        signs_ = {layerSigns, "the nearer of two layers tells the side"};
+        signs_ = {layerSigns, "the nearer of two layers decides the side"};
     FillParameters parameters = fillParameters(options_);
     if (prism) parameters.reach = reachOf(options_, Sign::normals);
     Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_, part_);

@@ -78,7 +78,7 @@ std::shared_ptr<Grids> readGrids(const std::filesystem::path& path) {
         grids = *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
     } catch (const std::exception& error) {
         throw std::runtime_error(
-            fmt::format("{}: is no .vdb file or is damaged ({})", path.string(), oneLine(error.what())));
+            fmt::format("{}: is not a .vdb file, or is damaged ({})", path.string(), oneLine(error.what())));
     }
     const glm::dvec3 origin = originOf(grids);
     for (const auto& grid : grids) shift(*grid, -origin);

@@ -18,6 +18,7 @@ class PointAttributes {
     void skip() {
         constexpr unsigned others = 4;  // passes that do not belong to one attribute
         const auto passes = in_.read<std::uint16_t>();
+        if (leaves_.empty()) return;
         if (passes < others || passes % 2 != 0) throw std::runtime_error("points in a wrong number of passes");
         in_.skip(leaves_.size() * sizeof(std::uint16_t), "sizes of leaves");
         readArrays();

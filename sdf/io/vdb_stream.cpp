@@ -58,8 +58,9 @@ void VdbStream::skipBlosc(std::uint64_t length, std::uint64_t expected) {
 }
 
 // Skips the delayed-load metadata, which describes how to read the leaves. OpenVDB drops it, but allocates memory for
-// it first.
+// it first. Grids without leaves, and those of types that are not loaded later, have none of it.
 void VdbStream::skipDelayedLoad(std::uint64_t size) {
+    if (size == 0) return;
     require(size, "metadata");
     const std::uint64_t end = left_ - size;
     const auto count = read<std::uint32_t>();

@@ -70,7 +70,7 @@ SignChoice chooseFor(Orientation orientation, std::string trouble, Progress* pro
     else if (oneSided)
         choice.reason = trouble + "; most of the surface has one side only";
     else
-        choice.reason = fmt::format("{}; winding numbers tell inside from outside on {}{} of the surface", trouble,
+        choice.reason = fmt::format("{}; winding numbers separate inside from outside on {}{} of the surface", trouble,
                                     separates ? "" : "only ", percent(share.solid + share.buried));
     return choice;
 }

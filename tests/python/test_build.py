@@ -47,12 +47,13 @@ def test_signs(box, sign):
 @pytest.mark.parametrize(
     "options, error, message",
     [
-        ({}, ValueError, "exactly one of voxel_size and resolution"),
-        ({"resolution": 8, "voxel_size": 1}, ValueError, "exactly one of"),
+        ({}, ValueError, "voxel_size, resolution: expected exactly one"),
+        ({"resolution": 8, "voxel_size": 1}, ValueError, "expected exactly one of"),
         ({"voxel_size": 0}, ValueError, "voxel_size is 0, and must be above 0"),
         ({"voxel_size": -1}, ValueError, "voxel_size is -1"),
         ({"voxel_size": float("nan")}, ValueError, "voxel_size is nan"),
-        ({"voxel_size": "small"}, TypeError, "voxel_size: expected a number, got str"),
+        ({"voxel_size": "small"}, ValueError, "voxel_size: expected a number, got a 'str'"),
+        ({"voxel_size": 1e300}, ValueError, "voxel_size"),
         ({"voxel_size": 1e-9}, ValueError, "voxel_size 1e-09 is below"),
         ({"resolution": float("inf")}, ValueError, "resolution is inf"),
         ({"resolution": 8, "half_width": 1e9}, ValueError, "half_width is 1e[+]09 .* voxels"),
@@ -60,15 +61,19 @@ def test_signs(box, sign):
         ({"resolution": 8, "half_width": 1, "half_width_voxels": 3}, ValueError, "only one of half_width"),
         ({"resolution": 8, "half_width": 1, "exterior_width_voxels": 3}, ValueError, "only one of half_width"),
         ({"resolution": 8, "method": "best"}, ValueError, "method: expected one of 'exact'.*got 'best'"),
-        ({"resolution": 8, "method": "prism"}, ValueError, "prism"),
+        ({"resolution": 8, "method": "prism"}, ValueError, 'method: the method prism needs an .*: device="opencl"'),
         ({"resolution": 8, "sign": "plus"}, ValueError, "sign: expected one of 'auto'"),
         ({"resolution": 8, "gap_voxels": 101}, ValueError, "gap_voxels must be in"),
         ({"resolution": 8, "delta": 9, "method": "double-layer"}, ValueError, "delta"),
         ({"resolution": 8, "threads": -1}, ValueError, "threads"),
-        ({"resolution": 8, "threads": 1.5}, TypeError, "threads: expected an integer"),
+        ({"resolution": 8, "threads": 1.5}, ValueError, "threads: expected an integer, got a 'float'"),
+        ({"resolution": 8, "threads": 10**30}, ValueError, "threads is 10+, and must be an integer"),
+        ({"resolution": 8, "gap_voxels": 1e300}, ValueError, "gap_voxels is 1e[+]300, .* range of float32"),
+        ({"resolution": 8, "unite": "no"}, ValueError, "unite: expected True or False, got a 'str'"),
+        ({"resolution": 8, "method": 3}, ValueError, "method: expected a string, got a 'int'"),
         ({"resolution": 8, "device": "gpu"}, ValueError, "device: expected 'cpu', 'opencl'"),
-        ({"resolution": 8, "progress": 3}, TypeError, "progress: expected a callable"),
-        ({"resolutoin": 8, "voxel_size": 1}, TypeError, "build\\(\\) has no argument 'resolutoin'"),
+        ({"resolution": 8, "progress": 3}, ValueError, "progress: expected a callable, got a 'int'"),
+        ({"resolutoin": 8}, TypeError, r"build\(\) got an unexpected keyword argument 'resolutoin'"),
     ],
 )
 def test_bad_options(box, options, error, message):
@@ -77,7 +82,7 @@ def test_bad_options(box, options, error, message):
 
 
 def test_bad_meshes_are_named():
-    with pytest.raises(ValueError, match="triangle"):
+    with pytest.raises(ValueError, match="mesh: the mesh has no triangle"):
         bilayer.build(bilayer.Mesh(np.zeros((0, 3)), []), voxel_size=1)
 
 
@@ -96,6 +101,11 @@ def test_progress_rises_to_one_on_the_calling_thread(sphere):
 def test_progress_cancels(sphere):
     with pytest.raises(bilayer.Cancelled):
         bilayer.build(sphere, resolution=1000, progress=lambda done: False)
+
+
+def test_progress_returns_a_bool(sphere):
+    with pytest.raises(ValueError, match="progress: expected it to return True, False or None, got a 'str'"):
+        bilayer.build(sphere, resolution=300, progress=lambda done: "on")
 
 
 def test_errors_of_progress_are_raised(sphere):
@@ -172,7 +182,7 @@ def test_rebuild(sphere):
         bilayer.rebuild(old, sphere, new, faces[1:], voxel_size=0.05)
     with pytest.raises(ValueError, match=r"moved\[0\] is 99999"):
         bilayer.rebuild(old, sphere, new, [99999], voxel_size=0.05)
-    with pytest.raises(ValueError, match="voxels"):
+    with pytest.raises(ValueError, match="level_set: the old field has voxels of 0.05"):
         bilayer.rebuild(old, sphere, new, faces, voxel_size=0.06)
     with pytest.raises(ValueError, match="another mesh"):
         bilayer.rebuild(old, new, sphere, faces, voxel_size=0.05)

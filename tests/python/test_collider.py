@@ -29,7 +29,8 @@ def test_pose(random):
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        (((0, 0),), "position: expected"),
+        (((0, 0),), r"position: expected an array of real numbers of shape \(3,\), got shape \(2,\)"),
+        ((np.zeros((2, 3)),), r"position: expected an array of real numbers of shape \(3,\), got shape \(2, 3\)"),
         (((0, 0, float("nan")),), r"position\[2\] is nan"),
         (((0, 0, 0), (1, 0, 0)), "rotation: expected"),
         (((0, 0, 0), (1, 1, 0, 0)), "rotation: expected a quaternion w, x, y, z of length 1, got one of length 1.41"),
@@ -38,6 +39,19 @@ def test_pose(random):
 def test_bad_poses(arguments, message):
     with pytest.raises(ValueError, match=message):
         bilayer.Pose(*arguments)
+
+
+def test_products_of_poses(random):
+    axes = random.normal(size=(2, 4))
+    a, b = (bilayer.Pose(random.normal(size=3), axis / np.linalg.norm(axis)) for axis in axes)
+    points = random.normal(size=(7, 3))
+    assert np.allclose((a @ b).to_world(points), a.to_world(b.to_world(points)), atol=1e-5)
+    assert np.allclose((a @ b).matrix, a.matrix @ b.matrix, atol=1e-6)
+    assert np.allclose(a.inverse().matrix, np.linalg.inv(a.matrix), atol=1e-5)
+    assert hash(copy.copy(a)) == hash(a) and len({a, copy.copy(a), b}) == 2
+    assert hash(bilayer.Pose((0.0, 0, 0))) == hash(bilayer.Pose((-0.0, 0, 0)))
+    with pytest.raises(TypeError):
+        a @ 3
 
 
 @pytest.mark.parametrize(
@@ -65,8 +79,19 @@ def test_collider(box, box_set, collider, sphere):
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.Collider(box, box_set, **options)
-    with pytest.raises(ValueError, match="mesh"):
+    with pytest.raises(ValueError, match="mesh: the level set is of another mesh"):
         bilayer.Collider(sphere, box_set)
+    for swapped, call in (
+        (lambda: bilayer.Collider(box_set, box), r"Collider\(mesh, level_set\)"),
+        (lambda: bilayer.Field(box, box_set), r"Field\(level_set, mesh\)"),
+        (lambda: bilayer.with_body(box, box_set), r"with_body\(level_set, mesh\)"),
+    ):
+        with pytest.raises(ValueError, match=f"swapped, call {call}"):
+            swapped()
+    with pytest.raises(ValueError, match="level_set: expected a LevelSet, got a 'int'"):
+        bilayer.Collider(box, 3)
+    with pytest.raises(ValueError, match="margin: expected a number, got a 'str'"):
+        bilayer.Collider(box, box_set, margin="1")
     with pytest.raises(ValueError):
         bilayer.Collider.from_level_set(box_set)
 
@@ -86,7 +111,7 @@ def test_colliders_pickle(box, box_set, sphere):
         assert again.margin == body.margin and again.mesh == body.mesh
         above = bilayer.Pose((0.1, 0, 1.97))
         here, there = (bilayer.collide(one, above, one, None, margin=0.1) for one in (body, again))
-        assert len(here.distance) > 0 and all(np.array_equal(a, b) for a, b in zip(here, there))
+        assert len(here) > 0 and here == there
         for name in ("field", "exact_field"):
             field, pickled = getattr(body, name), pickle.loads(pickle.dumps(getattr(body, name)))
             assert np.array_equal(field.closest(points).position, pickled.closest(points).position)
@@ -106,14 +131,17 @@ def test_mass(sphere, box, sphere_set):
 
 def test_contacts_of_a_box_on_a_box(collider):
     contacts = bilayer.collide(collider, bilayer.Pose((0, 0, 1.99)), collider, None, margin=0.05)
-    assert len(contacts.distance) > 4 and contacts.points_tested > 0 and contacts.beyond_band == 0
+    assert len(contacts) == len(contacts.distance) > 4 and contacts
+    assert contacts.points_tested > 0 and contacts.beyond_band == 0
+    assert pickle.loads(pickle.dumps(contacts)) == contacts
     assert np.allclose(contacts.distance, -0.01, atol=1e-4)
     assert np.allclose(contacts.normal, [0, 0, 1], atol=1e-4)
     assert contacts.feature.dtype == np.uint32 and contacts.feature.max() >= 1 << 31
     matrix = bilayer.Pose((0, 0, 1.99)).matrix
     assert np.array_equal(bilayer.collide(collider, matrix, collider, None, margin=0.05).position, contacts.position)
     apart = bilayer.collide(collider, bilayer.Pose((0, 0, 2.2)), collider, None, margin=0.05)
-    assert apart.position.shape == (0, 3) and apart.distance.shape == (0,)
+    assert apart.position.shape == (0, 3) and apart.distance.shape == (0,) and len(apart) == 0 and not apart
+    assert apart != contacts
 
 
 def test_contact_options(collider):
@@ -128,6 +156,9 @@ def test_contact_options(collider):
         ({"scale_b": float("nan")}, "scale_b"),
         ({"motion_a": [0, 0, 0]}, "motion_a: expected"),
         ({"min_normal_cosine": np.nan}, "min_normal_cosine is nan"),
+        ({"min_normal_cosine": 2}, "min_normal_cosine is 2, and must be a cosine, at most 1"),
+        ({"exact": 1.5}, "exact: expected True or False, got a 'float'"),
+        ({"cache": collider}, "cache: expected a ContactCache, got a"),
         ({"min_normal_cosine_apart": np.nan}, "min_normal_cosine_apart is nan"),
         ({"motion_b": np.zeros((3, 2, 3))}, "motion_b: expected"),
     ):
@@ -244,20 +275,59 @@ def test_shapes(collider, shape):
     assert copy.copy(shape) is not None and bilayer.distance(copy.deepcopy(shape), at, collider, None).found
 
 
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
+
+
+@pytest.mark.parametrize(
+    "make, arguments",
+    [
+        (bilayer.Shape.box, (np.array([0.5, 0.75, 0.25]),)),
+        (bilayer.Shape.box, ([0.5, 0.75, 0.25],)),
+        (bilayer.Shape.plane, (np.float32([0.5, 0.75, 0.25]),)),
+        (bilayer.Shape.hull, (CORNERS.copy(),)),
+        (bilayer.Shape.hull, (CORNERS.astype(np.float32),)),
+        (bilayer.Shape.spheres, (CORNERS.copy(), np.array([0.5, 0.75, 0.25, 0.1]))),
+        (bilayer.Shape.triangles, ((CORNERS.copy(), np.array([[0, 1, 2], [0, 1, 3]])),)),
+    ],
+)
+def test_shapes_keep_their_numbers(collider, make, arguments):
+    shape = make(*arguments)
+    there = bilayer.Pose((4, 0, 0))
+    before = bilayer.distance(shape, there, collider, None).distance, repr(shape), pickle.dumps(shape)
+    for array in arguments[0] if isinstance(arguments[0], tuple) else arguments:
+        array[:] = [0, 0, 0] if isinstance(array, list) else 0
+    assert before == (bilayer.distance(shape, there, collider, None).distance, repr(shape), pickle.dumps(shape))
+    again = pickle.loads(before[2])
+    assert bilayer.distance(again, there, collider, None).distance == before[0]
+    kept = shape.__reduce__()[1][0]
+    if isinstance(kept, np.ndarray):
+        with pytest.raises(ValueError, match="read-only"):
+            kept[:] = 0
+
+
+def test_long_shapes_have_a_short_repr(random):
+    assert repr(bilayer.Shape.hull(random.normal(size=(1000, 3)))) == "Shape.hull(<array of shape (1000, 3)>, 0.0)"
+
+
 def test_bad_shapes(collider):
     for make, message in (
-        (lambda: bilayer.Shape.sphere(0), "radius is 0"),
-        (lambda: bilayer.Shape.box((1, -1, 1)), "half extent is -1"),
+        (lambda: bilayer.Shape.sphere(0), "radius: the radius is 0"),
+        (lambda: bilayer.Shape.cone(1, -1), "half_height: the half height is -1"),
+        (lambda: bilayer.Shape.spheres([(0, 0, 0)], 0), "radii: the largest radius is 0"),
+        (lambda: bilayer.Shape.spheres([(0, 0, 0)], -1), "radii is -1"),
+        (lambda: bilayer.Shape.plane((0, 0, 1), np.inf), "offset: the offset of the plane is not finite"),
+        (lambda: bilayer.Shape.triangles(bilayer.Mesh(np.zeros((0, 3)), [])), "mesh: the mesh has no triangle"),
+        (lambda: bilayer.Shape.box((1, -1, 1)), "half_extents: the half extent is -1"),
         (lambda: bilayer.Shape.box((1, 1)), "half_extents: expected"),
-        (lambda: bilayer.Shape.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)]), "one plane"),
+        (lambda: bilayer.Shape.hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)]), "points: the points of a hull"),
         (lambda: bilayer.Shape.hull([[np.nan, 0, 0]]), r"points\[0, 0\] is nan"),
-        (lambda: bilayer.Shape.plane((0, 0, 0)), "normal"),
-        (lambda: bilayer.distance(SHAPES[0], None, SHAPES[1], None), "collider"),
+        (lambda: bilayer.Shape.plane((0, 0, 0)), "normal: the length of the normal is 0"),
+        (lambda: bilayer.distance(SHAPES[0], None, SHAPES[1], None), "a: at least one of the two shapes must"),
         (lambda: bilayer.time_of_impact(SHAPES[7], None, [[0, 0, 0], [0, 1, 0]], collider, None, None), "rotate"),
     ):
         with pytest.raises(ValueError, match=message):
             make()
-    with pytest.raises(TypeError, match="a: expected a Collider or a Shape, got a 'int'"):
+    with pytest.raises(ValueError, match="a: expected a Collider or a Shape, got a 'int'"):
         bilayer.distance(1, None, collider, None)
 
 
@@ -270,6 +340,8 @@ def test_distances(collider, random):
     assert np.array_equal(bilayer.distances([collider] * 12, poses, pairs), many)
     assert np.array_equal(bilayer.distances(collider, poses, pairs, max_distance=0.5) == np.inf, many > 0.5)
     assert bilayer.distances(collider, poses, []).shape == (0,)
+    matrices = np.stack([pose.matrix for pose in poses])
+    assert np.array_equal(bilayer.distances(collider, matrices, pairs), many)
     for colliders, bad, message in (
         ([collider], pairs, "colliders: expected one for each of 12 poses, got 1"),
         ([1] * 12, pairs, "colliders: expected a Collider"),

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Docstrings, stubs, the page of docs."""
 
+import ast
 import doctest
 import importlib.util
 import inspect
+import pickle
+import pydoc
 import re
 import subprocess
 import sys
@@ -57,6 +60,93 @@ def test_the_functions_have_examples():
     assert {name for name in functions if name.split(".")[0] not in results} - names == set()
 
 
+def signatures():
+    """All public functions and constructors that take arguments, and their docstrings."""
+    for name, value in documented():
+        if inspect.isclass(value) and "__signature__" in vars(value):
+            yield name, inspect.signature(value), value.__doc__
+        elif inspect.isroutine(value) or isinstance(value, staticmethod):
+            if not hasattr(getattr(bilayer, name.split(".")[0]), "_fields"):
+                function = getattr(value, "__func__", value)
+                yield name, inspect.signature(function), function.__doc__
+
+
+def test_functions_say_what_they_raise():
+    taking = {name: doc for name, signature, doc in signatures() if set(signature.parameters) - {"self"}}
+    assert len(taking) > 40
+    raising = re.compile(r"^(.* )?Raises ", re.M)
+    assert [name for name, doc in taking.items() if not raising.search(doc)] == []
+
+
+def test_result_classes_describe_each_field():
+    kinds = [value for _, value in documented() if hasattr(value, "_fields") or hasattr(value, "__dataclass_fields__")]
+    assert len(kinds) >= 11
+    for kind in kinds:
+        fields = getattr(kind, "_fields", None) or list(kind.__dataclass_fields__)
+        described = re.findall(r"(\w+(?:, \w+)*): (?:float|int|bool|uint|str|Pose|BodyDistance|LevelSet)", kind.__doc__)
+        assert set(fields) == {name for names in described for name in names.split(", ")}, kind.__name__
+
+
+def parameters_of_stub(function):
+    """Names, kinds and defaults, as inspect names them; None for a default of `...`."""
+    arguments = function.args
+    positional = list(zip(arguments.args, [...] * (len(arguments.args) - len(arguments.defaults)) + arguments.defaults))
+    named = list(zip(arguments.kwonlyargs, [... if value is None else value for value in arguments.kw_defaults]))
+    for kind, group in (("POSITIONAL_OR_KEYWORD", positional), ("KEYWORD_ONLY", named)):
+        for argument, default in group:
+            empty = default is ... or (isinstance(default, ast.Constant) and default.value is ...)
+            yield argument.arg, kind, default is ..., None if empty else ast.literal_eval(default)
+
+
+def test_stubs_have_the_signatures_of_the_functions():
+    checked = 0
+    stub = ast.parse((PACKAGE / "_bilayer.pyi").read_text())
+    functions = [("", one) for one in stub.body if isinstance(one, ast.FunctionDef)]
+    for kind in stub.body:
+        if isinstance(kind, ast.ClassDef) and hasattr(bilayer, kind.name):
+            functions += [(kind.name, one) for one in kind.body if isinstance(one, ast.FunctionDef)]
+    for owner, function in functions:
+        decorators = {ast.unparse(one) for one in function.decorator_list}
+        if "property" in decorators or (function.name.startswith("__") and function.name != "__init__"):
+            continue
+        if function.name == "__init__":
+            value = getattr(bilayer, owner)
+        else:
+            value = vars(getattr(bilayer, owner))[function.name] if owner else getattr(bilayer, function.name)
+        actual = inspect.signature(getattr(value, "__func__", value)).parameters
+        stubbed = [one for one in parameters_of_stub(function) if function.name != "__init__" or one[0] != "self"]
+        for name, kind, required, default in stubbed:
+            there = actual[name]
+            assert there.kind.name == kind, (owner, function.name, name)
+            if "overload" not in decorators or name not in ("resolution", "voxel_size"):
+                assert (there.default is inspect.Parameter.empty) == required, (owner, function.name, name)
+                assert default is None or there.default == default, (owner, function.name, name)
+        assert [one[0] for one in stubbed] == list(actual), (owner, function.name)
+        checked += 1
+    assert checked > 50
+
+
+def test_tracebacks_show_no_unfinished_object(box_set):
+    for make in (lambda: bilayer.Field(3), lambda: bilayer.Mesh(1, 2), lambda: bilayer.Pose((1,))):
+        with pytest.raises(ValueError) as caught:
+            make()
+        frames = [entry.frame.raw for entry in caught.traceback]
+        seen = [value for frame in frames for value in frame.f_locals.values()]
+        assert seen and not any(isinstance(value, (bilayer.Field, bilayer.Mesh, bilayer.Pose)) for value in seen)
+    with pytest.raises(TypeError, match=r"Field\(\) missing 1 required positional argument: 'level_set'"):
+        bilayer.Field()
+    with pytest.raises(TypeError, match=r"Field\(\) got an unexpected keyword argument 'stroage'"):
+        bilayer.Field(box_set, stroage="fixed16")
+
+
+def test_help_shows_arguments():
+    assert str(inspect.signature(bilayer.Field.sample)) == "(self, points)"
+    assert str(inspect.signature(bilayer.Field)) == "(level_set, mesh=None, storage='float32', keep_level_set=True)"
+    assert "resolution=None, voxel_size=None" in str(inspect.signature(bilayer.build))
+    assert pickle.loads(pickle.dumps(bilayer.Shape.sphere))(1) is not None
+    assert "closest(self, points, max_distance=inf)" in pydoc.plain(pydoc.render_doc(bilayer.Field.closest))
+
+
 def test_stubs_name_what_is_there():
     stub = (PACKAGE / "_bilayer.pyi").read_text()
     native = bilayer._bilayer
@@ -82,7 +172,14 @@ def test_mypy(tmp_path):
         "distance, gradient, in_band = field.sample(np.zeros((4, 3)))\n"
         "reveal_type(distance)\n"
         "reveal_type(bilayer.read_mesh('a.obj').faces)\n"
-        "bilayer.build(bilayer.box(), resolutoin=3)\n"
+        "bilayer.distances([], np.zeros((3, 4, 4)), [[0, 1]])\n"
+        "bilayer.mass_properties((np.zeros((3, 3)), [[0, 1, 2]]))\n"
+        "bilayer.build(bilayer.box(), resolutoin=3)  # wrong\n"
+        "bilayer.build(bilayer.box())  # wrong\n"
+        "bilayer.build(bilayer.box(), resolution=3, voxel_size=1)  # wrong\n"
+        "bilayer.build(bilayer.box(), resolution=3, method='best')  # wrong\n"
+        "bilayer.build(3, resolution=3)  # wrong\n"
+        "bilayer.Field(bilayer.build(bilayer.box(), resolution=3), storage='float64')  # wrong\n"
     )
     command = [sys.executable, "-m", "mypy", "--strict", "--no-error-summary", "--cache-dir", str(tmp_path / "cache")]
     environment = {"MYPYPATH": str(PACKAGE.parent), "PATH": "/usr/bin:/bin"}
@@ -91,8 +188,10 @@ def test_mypy(tmp_path):
     result = subprocess.run(command + [str(user)], capture_output=True, text=True, env=environment)
     assert "floating[numpy._typing._32Bit]" in result.stdout
     assert "unsignedinteger[numpy._typing._32Bit]" in result.stdout
-    assert 'Unexpected keyword argument "resolutoin"' in result.stdout
-    assert result.stdout.count("error:") == 1, result.stdout
+    lines = user.read_text().splitlines()
+    wrong = [number for number, line in enumerate(lines, 1) if "# wrong" in line]
+    assert len(wrong) == 6
+    assert sorted(set(map(int, re.findall(r"user.py:(\d+): error:", result.stdout)))) == wrong, result.stdout
 
 
 def test_the_committed_reference():

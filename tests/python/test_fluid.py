@@ -39,16 +39,20 @@ def test_bad_seeds(tank):
     for options, message in (
         ({"mode": "add"}, "mode: expected one of 'unite', 'intersect', 'subtract'"),
         ({"scale": 0}, "scale"),
-        ({"scale": (1, 2)}, "scale|broadcast"),
+        ({"scale": (1, 2)}, r"scale: expected one number or three, got shape \(2,\)"),
         ({"scale": -1}, "scale is -1"),
         ({"pose": np.eye(3)}, "pose: expected"),
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.seed(tank, ball, **options)
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="body: the mesh is open"):
         bilayer.seed(tank, bilayer.Mesh(ball.vertices, ball.faces[: len(ball.faces) // 2]))
+    with pytest.raises(ValueError, match="body: expected a bilayer.Mesh"):
+        bilayer.seed(tank, 3)
+    with pytest.raises(ValueError, match="liquid: expected a LevelSet, got a 'Mesh'"):
+        bilayer.seed(ball, tank)
     narrow = bilayer.build(ball, voxel_size=0.05, half_width_voxels=2)
-    with pytest.raises(ValueError, match="narrower"):
+    with pytest.raises(ValueError, match="liquid: the liquid's band is narrower"):
         bilayer.seed(narrow, ball)
 
 
@@ -65,7 +69,9 @@ def test_particles(tank):
     assert np.linalg.norm(moved - [5, 0, 0], axis=1).max() <= 0.6 + 1e-5
     for arguments, message in (
         ({"per_voxel": 0}, "per_voxel must be in 1..1000"),
-        ({"pose": bilayer.Pose()}, "pose and voxel_size"),
+        ({"pose": bilayer.Pose()}, "pose, voxel_size: expected None"),
+        ({"seed": -1}, "seed is -1, and must be an integer from 0 to 18446744073709551615"),
+        ({"seed": 1.5}, "seed: expected an integer, got a 'float'"),
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.particles(tank, **arguments)
@@ -91,12 +97,13 @@ def test_obstacle(tmp_path):
         assert np.array_equal(again.distance, obstacle.distance) and np.array_equal(again.origin, obstacle.origin)
         assert np.array_equal(again.open_faces, obstacle.open_faces)
         assert np.array_equal(again.velocity, obstacle.velocity)
+    assert repr(obstacle) == "Obstacle({} x {} x {} cells of 0.05)".format(*shape)
     obstacle.save(tmp_path / "solid.vdb")
     assert bilayer.LevelSet.load(tmp_path / "solid.vdb").voxel_size == pytest.approx(0.05)
     for arguments, message in (
         ({"voxel_size": 0}, "voxel_size"),
         ({"voxel_size": 0.05, "velocity": (1, 2)}, "velocity: expected"),
-        ({"voxel_size": 0.05, "half_width_voxels": 1}, "half"),
+        ({"voxel_size": 0.05, "half_width_voxels": 1}, "half_width_voxels must be in 3..1000, not 1"),
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.obstacle(ball, **arguments)

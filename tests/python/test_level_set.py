@@ -30,8 +30,10 @@ def test_dense(box_set):
     assert np.abs(values - expected).max() < 1e-5
     padded, shifted, _ = box_set.to_numpy(padding=4)
     assert np.array_equal(padded[3:-3, 3:-3, 3:-3], values) and np.allclose(shifted, origin - 3 * spacing)
-    with pytest.raises(ValueError, match="padding"):
+    with pytest.raises(ValueError, match="padding is -1"):
         box_set.to_numpy(padding=-1)
+    with pytest.raises(ValueError, match="padding: expected an integer, got a 'float'"):
+        box_set.to_numpy(1.5)
     with pytest.raises(ValueError, match="8 GiB"):
         box_set.to_numpy(padding=100000)
 
@@ -76,7 +78,7 @@ def unclamped(count=40, radius=0.6):
 
 def test_from_numpy():
     values, spacing = unclamped()
-    level_set = bilayer.LevelSet.from_numpy(values, (-1, -1, -1), spacing, field_origin=(-1, -1, -1))
+    level_set = bilayer.LevelSet.from_numpy(values, spacing=spacing, field_origin=(-1, -1, -1))
     assert level_set.origin.tolist() == [-1, -1, -1] and level_set.voxel_size == pytest.approx(spacing)
     assert level_set.exterior_width == pytest.approx(0.4, abs=1e-3)  # at the middle of each side
     field = bilayer.Field(level_set)
@@ -104,6 +106,7 @@ def test_from_numpy():
         (np.sign, {}, "values: across the surface they change by"),
         (lambda v: v, {"spacing": 0}, "spacing is 0"),
         (lambda v: v, {"spacing": float("nan")}, "spacing is nan"),
+        (lambda v: v, {"spacing": (1, 1, 1)}, "spacing: expected a number, got a 'tuple'"),
         (lambda v: v, {"origin": (0, 0)}, "origin: expected"),
         (lambda v: v, {"origin": (0.01, 0, 0)}, r"origin\[0\] is 0.01, .* pass field_origin=origin"),
         (lambda v: v, {"origin": (1e30, 0, 0)}, r"origin\[0\] is"),
@@ -169,7 +172,8 @@ def test_values(box_set, sphere_set, box):
     assert box_set != sphere_set and box_set != 1
     far = bilayer.build(bilayer.Mesh(box.vertices, box.faces, origin=(1e6, 0, 0)), resolution=16)
     assert pickle.loads(pickle.dumps(far)) == far and far.origin.tolist() == [1e6, 0, 0]
-    assert far.to_numpy().origin[0] > 1e6 - 2
+    near = bilayer.build(box, resolution=16)
+    assert np.array_equal(far.to_numpy().origin, near.to_numpy().origin)  # relative to LevelSet.origin
     stored = bilayer.with_body(box_set, box)
     assert bilayer.Collider.from_level_set(pickle.loads(pickle.dumps(stored))).mass.volume == pytest.approx(8)
 
@@ -190,10 +194,38 @@ def test_extended(box_set):
     assert wide.exterior_width == 0.5 and wide.active_voxels > box_set.active_voxels
     assert np.isnan(wide.error_bound)
     assert box_set.extended().active_voxels > box_set.active_voxels
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="distance: the distance to extend to must be positive"):
         box_set.extended(-1)
+    with pytest.raises(ValueError, match="distance: expected a number, got a 'str'"):
+        box_set.extended("far")
 
 
 def test_no_level_set_without_a_build():
     with pytest.raises(TypeError):
         bilayer.LevelSet()
+
+
+def test_distance_transforms_of_scipy():
+    ndimage = pytest.importorskip("scipy.ndimage")
+    axis = np.arange(40) - 19.5
+    inside = sum(np.square(np.meshgrid(axis, axis, axis))) < 12**2
+    outer, inner = ndimage.distance_transform_edt(~inside), ndimage.distance_transform_edt(inside)
+    with pytest.raises(ValueError, match="subtract half a spacing from each, and then one from the other"):
+        bilayer.LevelSet.from_numpy(outer - inner)
+    corrected = np.where(inside, 0.5 - inner, outer - 0.5)
+    level_set = bilayer.LevelSet.from_numpy(corrected, half_width=3)
+    assert bilayer.mass_properties(level_set).volume == pytest.approx(4 / 3 * np.pi * 12**3, rel=0.02)
+
+
+@pytest.mark.parametrize("kind", ["FloatGrid", "Vec3SGrid", "BoolGrid"])
+def test_files_with_other_grids(tmp_path, box_set, kind):
+    openvdb = pytest.importorskip("pyopenvdb")
+    ours, both = str(tmp_path / "ours.vdb"), str(tmp_path / "both.vdb")
+    box_set.save(ours)
+    empty = getattr(openvdb, kind)()
+    empty.name = "empty"
+    openvdb.write(both, grids=[empty, openvdb.read(ours, "distance")])
+    assert bilayer.LevelSet.load(both) == box_set
+    openvdb.write(both, grids=[empty])
+    with pytest.raises(RuntimeError, match="holds no level set"):
+        bilayer.LevelSet.load(both)

@@ -52,7 +52,9 @@ def test_one_cache_from_many_threads(collider):
 
 
 @pytest.mark.parametrize(
-    "name", ["build", "inspect", "closest", "Mesh", "Field", "Collider", "from_numpy", "particles"]
+    "name",
+    ["build", "inspect", "closest", "Mesh", "Field", "Collider", "from_numpy", "particles"]
+    + ["hull", "spheres", "triangles"],
 )
 def test_other_threads_run_during_calls(name, sphere, sphere_field):
     mesh = bilayer.sphere(1, subdivisions=7)
@@ -67,6 +69,9 @@ def test_other_threads_run_during_calls(name, sphere, sphere_field):
         "Field": lambda: bilayer.Field(level_set, mesh),
         "Collider": lambda: bilayer.Collider(mesh, level_set),
         "from_numpy": lambda: bilayer.LevelSet.from_numpy(*dense),
+        "hull": lambda: bilayer.Shape.hull(points[:200_000]),
+        "spheres": lambda: bilayer.Shape.spheres(points[:400], 1),
+        "triangles": lambda: [bilayer.Shape.triangles(mesh) for _ in range(30)],
         "particles": lambda: bilayer.particles(level_set, per_voxel=20),
     }
     worker = threading.Thread(target=calls[name])

@@ -40,7 +40,7 @@ def test_arrays_of_any_layout():
 @pytest.mark.parametrize(
     "vertices, faces, message",
     [
-        (np.zeros((4, 2)), TRIANGLE[1], r"vertices: .* shape \(\.\.\., 3\), got shape \(4, 2\) and dtype float64"),
+        (np.zeros((4, 2)), TRIANGLE[1], r"vertices: .* shape \(N, 3\), got shape \(4, 2\) and dtype float64"),
         (np.zeros(3), TRIANGLE[1], r"vertices: expected .* \(N, 3\)"),
         ("mesh.obj", TRIANGLE[1], "vertices: expected an array of real numbers"),
         (np.zeros((3, 3), dtype=complex), TRIANGLE[1], "vertices: .* dtype complex128"),
@@ -51,15 +51,20 @@ def test_arrays_of_any_layout():
         (TRIANGLE[0], [[0, 1, 3]], r"faces\[0, 2\] is 3, and must be a vertex of 0 to 2"),
         (TRIANGLE[0], [[0, 1, -1]], r"faces\[0, 2\] is -1"),
         (TRIANGLE[0], [[0, 1]], r"faces: expected .* shape \(N, 3\), got shape \(1, 2\)"),
+        (TRIANGLE[0], np.zeros((0, 7)), r"faces: expected .* shape \(N, 3\), got shape \(0, 7\)"),
+        (TRIANGLE[0], np.array([[0, 1, 2**64 - 1]], dtype=np.uint64), r"faces\[0, 2\] is 18446744073709551615"),
+        (np.array([[1e300, 0, 0]]), [[0, 0, 0]], r"vertices\[0, 0\] is 1e[+]300, and must be in the range of float32"),
         (TRIANGLE[0], [[0.0, 1.0, 2.0]], "faces: expected an array of integers .* dtype float64"),
         (TRIANGLE[0], None, "faces: expected an array of integers"),
         (np.array(TRIANGLE[0]) + 1e7, TRIANGLE[1], "vertices: the mesh is 1 long and 1e[+]07 from zero"),
+        (np.array(TRIANGLE[0]) + 10**9, TRIANGLE[1], "vertices: the mesh is 1 long and 1e[+]09 from zero"),
+        (np.int32(TRIANGLE[0]) - 10**9, TRIANGLE[1], "vertices: the mesh is 1 long and 1e[+]09 from zero"),
+        (np.uint32(TRIANGLE[0]) + np.uint32(4e9), TRIANGLE[1], "vertices: the mesh is 1 long and 4e[+]09 from zero"),
+        (np.uint64(TRIANGLE[0]) + np.uint64(2**63), TRIANGLE[1], "vertices: the mesh is"),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_bad_meshes(vertices, faces, message):
-    # integers are exact, so only float64 can be too far from zero
-    if isinstance(vertices, np.ndarray) and vertices.dtype == np.int64:
-        vertices = vertices.astype(float)
     with pytest.raises(ValueError, match=message):
         bilayer.Mesh(vertices, faces)
 
@@ -112,8 +117,10 @@ def test_bad_files(tmp_path, box):
         box.save(tmp_path / "box.xyz")
     with pytest.raises(RuntimeError, match="none"):
         box.save(tmp_path / "none" / "box.ply")
-    with pytest.raises(TypeError):
+    with pytest.raises(ValueError, match="path: expected a str, bytes or os.PathLike, got a 'int'"):
         bilayer.read_mesh(3)
+    with pytest.raises(FileNotFoundError, match="none.obj"):
+        bilayer.read_mesh(bytes(tmp_path / "none.obj"))
 
 
 def test_gltf(tmp_path, box):
@@ -192,6 +199,7 @@ def test_meshes_of_other_packages(box):
         "tensor Open3D": SimpleNamespace(vertex={"positions": Tensor(vertices)}, triangle={"indices": Tensor(faces)}),
         "meshio": SimpleNamespace(points=vertices, cells=blocks),
         "older meshio": SimpleNamespace(points=vertices, cells={"triangle": faces}),
+        "PyVista": SimpleNamespace(points=vertices, faces=np.insert(faces.astype(int), 0, 3, axis=1).ravel()),
         "pair": (vertices, faces),
     }
     for like in likes.values():
@@ -200,8 +208,31 @@ def test_meshes_of_other_packages(box):
     assert bilayer.build(likes["trimesh"], resolution=16) == bilayer.build(box, resolution=16)
     with pytest.raises(ValueError, match="mesh: expected a bilayer.Mesh.*'int'"):
         bilayer.build(3, resolution=16)
-    with pytest.raises(ValueError, match="'tetra'"):
-        bilayer.as_mesh(SimpleNamespace(points=vertices, cells={"tetra": faces}))
+    mixed = SimpleNamespace(points=vertices, faces=[4, 0, 1, 3, 2, 3, 4, 5, 6])
+    assert sorted(bilayer.as_mesh(mixed).faces.tolist()) == [[0, 1, 3], [0, 3, 2], [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    "like, message",
+    [
+        (SimpleNamespace(points=[[0, 0, 0]], cells={"tetra": [[0, 1, 2, 3]]}), "got 'tetra'"),
+        (SimpleNamespace(points=[[0, 0, 0]], cells=None), "got a 'SimpleNamespace' whose data are others"),
+        (SimpleNamespace(points=[[0, 0, 0]], cells=[3]), "got a 'SimpleNamespace' whose data are others"),
+        (SimpleNamespace(points=[[0, 0, 0]], faces=[5, 0, 0, 0, 0, 0]), "3 or 4 corners, got one of 5"),
+        (SimpleNamespace(points=[[0, 0, 0]], faces=[3, 0, 0]), "3 or 4 corners, got one of 3"),
+        (SimpleNamespace(points=[[0, 0, 0]], faces=[[0, 0, 0]]), r"expected .faces as flat integers"),
+        (SimpleNamespace(points=[[0, 0, 0]], faces=None), r"expected .faces as flat integers"),
+        (SimpleNamespace(vertex={}, triangle={}), "got a 'SimpleNamespace' whose data are others"),
+        (3, "expected a bilayer.Mesh.*got a 'int'"),
+    ],
+)
+def test_other_objects_are_refused(like, message):
+    with pytest.raises(ValueError, match=f"source: .*{message}"):
+        bilayer.as_mesh(like)
+    calls = {"mesh": bilayer.Shape.triangles, "solid": bilayer.mass_properties}
+    for name, call in calls.items():
+        with pytest.raises(ValueError, match=f"{name}: .*{message}"):
+            call(like)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 1, 0), (1, np.nan, 1), "big"])

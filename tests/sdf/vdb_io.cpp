@@ -2,11 +2,14 @@
 #include <bilayer/sdf/vdb_io.h>
 
 #include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <type_traits>
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
@@ -191,6 +194,42 @@ TEST_CASE("a file without a level set is refused") {
     fog->tree().setValue(openvdb::Coord(1, 2, 3), 1.f);
     openvdb::io::File(test::scratch("fog.vdb").string()).write({fog});
     CHECK_THROWS_WITH(readVdb(test::scratch("fog.vdb")), Catch::Contains("no level set"));
+}
+
+namespace {
+
+// A grid of a type, empty or with a filled box and a tile.
+template <class Grid>
+openvdb::GridBase::Ptr otherGrid(bool filled) {
+    using Value = typename Grid::ValueType;
+    const auto grid = Grid::create();
+    grid->setName("other");
+    if constexpr (std::is_arithmetic_v<Value> || openvdb::VecTraits<Value>::IsVec)
+        if (filled) {
+            grid->fill(openvdb::CoordBBox({0, 0, 0}, {20, 20, 20}), Value(1));
+            grid->sparseFill(openvdb::CoordBBox({128, 0, 0}, {135, 7, 7}), Value(2));
+        }
+    return grid;
+}
+
+}  // namespace
+
+TEST_CASE("A level set is read from a file that also holds a grid of another type, empty or filled") {
+    openvdb::initialize();
+    const LevelSet field = torus();
+    const auto path = test::scratch("two_grids.vdb");
+    const auto check = [&](const auto& prototype) {
+        using Grid = std::decay_t<decltype(prototype)>;
+        for (const bool filled : {false, true})
+            for (const bool first : {false, true}) {
+                CAPTURE(Grid::gridType(), filled, first);
+                openvdb::GridCPtrVec grids{field.grids().distance};
+                grids.insert(first ? grids.begin() : grids.end(), otherGrid<Grid>(filled));
+                openvdb::io::File(path.string()).write(grids);
+                CHECK(readVdb(path).activeVoxels() == field.activeVoxels());
+            }
+    };
+    openvdb::GridTypes::foreach (std::ref(check));
 }
 
 TEST_CASE("a file with a distance that is no number is refused") {

@@ -110,7 +110,7 @@ bool fits(const LevelSet& field, const Placement& placement, const Transform& vo
 }
 
 void requireCubes(const Transform& voxels) {
-    if (!voxels.isLinear() || !voxels.hasUniformScale()) throw std::invalid_argument("the voxels are no cubes");
+    if (!voxels.isLinear() || !voxels.hasUniformScale()) throw std::invalid_argument("the voxels are not cubes");
     if (!(voxels.baseMap()->determinant() > 0))
         throw std::invalid_argument("the voxels are mirrored: that would turn the body inside out");
 }

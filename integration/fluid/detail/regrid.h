@@ -27,7 +27,7 @@ inline constexpr float minHalfWidth = 3;
 ///
 /// Throws std::invalid_argument for
 /// - a placement that check() refuses, or one beyond the range of OpenVDB's coordinates;
-/// - voxels that are no cubes or mirrored;
+/// - voxels that are not cubes or mirrored;
 /// - a mesh with a hole wider than two voxels (hole_width.h), at any position of the voxels;
 /// - a body that would lie between the voxels at some position of them (lattice_cover.h);
 /// - a mesh without an inside, which would need Sign::flood, at any position of the voxels;

@@ -1,5 +1,5 @@
 from os import PathLike
-from typing import Any, Callable, Dict, List, Optional, Sequence, Union
+from typing import Any, Callable, Dict, List, Literal, Optional, Protocol, Sequence, Tuple, Union, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,15 +18,68 @@ from bilayer.results import (
     Sparse,
 )
 
-_Path = Union[str, bytes, PathLike[str]]
+class _VerticesAndFaces(Protocol):
+    """As trimesh."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+class _VerticesAndTriangles(Protocol):
+    """As Open3D's legacy meshes."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def triangles(self) -> Any: ...
+
+class _VertexAndTriangle(Protocol):
+    """As Open3D's tensor meshes."""
+
+    @property
+    def vertex(self) -> Any: ...
+    @property
+    def triangle(self) -> Any: ...
+
+class _PointsAndFaces(Protocol):
+    """As PyVista's PolyData."""
+
+    @property
+    def points(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+class _PointsAndCells(Protocol):
+    """As meshio."""
+
+    @property
+    def points(self) -> Any: ...
+    @property
+    def cells(self) -> Any: ...
+
 # A Mesh, or what as_mesh() takes.
-_MeshLike = Any
+MeshLike = Union[
+    Mesh,
+    _VerticesAndFaces,
+    _VerticesAndTriangles,
+    _VertexAndTriangle,
+    _PointsAndFaces,
+    _PointsAndCells,
+    Tuple[ArrayLike, ArrayLike],
+]
+_Path = Union[str, bytes, PathLike[str]]
 # A Pose, a matrix of shape (4, 4), or None.
 _PoseLike = Union[Pose, ArrayLike, None]
 _Progress = Callable[[float], Optional[bool]]
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
+_Method = Literal["exact", "double-layer", "pseudonormal", "prism"]
+_Sign = Literal["auto", "normals", "winding", "flood"]
+_Accuracy = Literal["samples", "exact-near-features", "exact"]
+_Storage = Literal["float32", "fixed16"]
+_Mode = Literal["unite", "intersect", "subtract"]
 
 __version__: str
 
@@ -100,9 +153,15 @@ class LevelSet:
     def __deepcopy__(self, memo: Dict[int, Any]) -> LevelSet: ...
 
 class Field:
-    def __init__(self, level_set: LevelSet, mesh: _MeshLike = None, storage: str = "float32") -> None: ...
+    def __init__(
+        self,
+        level_set: LevelSet,
+        mesh: Optional[MeshLike] = None,
+        storage: _Storage = "float32",
+        keep_level_set: bool = True,
+    ) -> None: ...
     def sample(self, points: ArrayLike) -> Samples: ...
-    def closest(self, points: ArrayLike, max_distance: float = ...) -> ClosestPoints: ...
+    def closest(self, points: ArrayLike, max_distance: ArrayLike = ...) -> ClosestPoints: ...
     def inside(self, points: ArrayLike) -> _Bools: ...
     def raycast(self, origins: ArrayLike, directions: ArrayLike, max_distance: ArrayLike = ...) -> Hits: ...
     def sphere_cast(
@@ -115,6 +174,8 @@ class Field:
     ) -> _Bools: ...
     @property
     def voxel_size(self) -> float: ...
+    @property
+    def origin(self) -> _Doubles: ...
     @property
     def exterior_width(self) -> float: ...
     @property
@@ -140,6 +201,9 @@ class Pose:
     def matrix(self) -> _Floats: ...
     def to_world(self, points: ArrayLike) -> _Floats: ...
     def to_body(self, points: ArrayLike) -> _Floats: ...
+    def inverse(self) -> Pose: ...
+    def __matmul__(self, other: Pose) -> Pose: ...
+    def __hash__(self) -> int: ...
     def __eq__(self, other: object) -> bool: ...
     def __copy__(self) -> Pose: ...
     def __deepcopy__(self, memo: Dict[int, Any]) -> Pose: ...
@@ -147,12 +211,12 @@ class Pose:
 class Collider:
     def __init__(
         self,
-        mesh: _MeshLike,
+        mesh: MeshLike,
         level_set: LevelSet,
         *,
         point_spacing_voxels: float = 2,
         margin: Optional[float] = None,
-        accuracy: str = "exact-near-features",
+        accuracy: _Accuracy = "exact-near-features",
     ) -> None: ...
     @staticmethod
     def from_level_set(level_set: LevelSet) -> Collider: ...
@@ -190,7 +254,7 @@ class Shape:
     @staticmethod
     def plane(normal: ArrayLike, offset: float = 0) -> Shape: ...
     @staticmethod
-    def triangles(mesh: _MeshLike) -> Shape: ...
+    def triangles(mesh: MeshLike) -> Shape: ...
     def __copy__(self) -> Shape: ...
     def __deepcopy__(self, memo: Dict[int, Any]) -> Shape: ...
 
@@ -212,18 +276,19 @@ class Obstacle:
     def __deepcopy__(self, memo: Dict[int, Any]) -> Obstacle: ...
 
 def read_mesh(path: _Path) -> Mesh: ...
-def inspect(mesh: _MeshLike, wall: float = 0) -> MeshReport: ...
+def inspect(mesh: MeshLike, wall: float = 0) -> MeshReport: ...
+@overload
 def build(
-    mesh: _MeshLike,
+    mesh: MeshLike,
     *,
-    resolution: Optional[float] = None,
-    voxel_size: Optional[float] = None,
+    resolution: float,
+    voxel_size: None = None,
     half_width: Optional[float] = None,
     half_width_voxels: Optional[float] = None,
     exterior_width_voxels: Optional[float] = None,
     interior_width_voxels: Optional[float] = None,
-    method: str = "exact",
-    sign: str = "auto",
+    method: _Method = "exact",
+    sign: _Sign = "auto",
     gap_voxels: float = 2,
     unite: bool = False,
     triangles: bool = False,
@@ -235,35 +300,88 @@ def build(
     max_subdivision: int = 32,
     progress: Optional[_Progress] = None,
 ) -> LevelSet: ...
-def rebuild(
-    level_set: LevelSet,
-    old_mesh: _MeshLike,
-    new_mesh: _MeshLike,
-    moved: Optional[ArrayLike] = None,
+@overload
+def build(
+    mesh: MeshLike,
     *,
-    resolution: Optional[float] = None,
-    voxel_size: Optional[float] = None,
+    resolution: None = None,
+    voxel_size: float,
     half_width: Optional[float] = None,
     half_width_voxels: Optional[float] = None,
     exterior_width_voxels: Optional[float] = None,
     interior_width_voxels: Optional[float] = None,
-    method: str = "exact",
-    sign: str = "auto",
+    method: _Method = "exact",
+    sign: _Sign = "auto",
     gap_voxels: float = 2,
     unite: bool = False,
     triangles: bool = False,
     threads: int = 0,
+    device: str = "cpu",
+    delta: float = 0.5,
+    epsilon: float = 1,
+    neighbourhood: int = 2,
+    max_subdivision: int = 32,
+    progress: Optional[_Progress] = None,
+) -> LevelSet: ...
+@overload
+def rebuild(
+    level_set: LevelSet,
+    old_mesh: MeshLike,
+    new_mesh: MeshLike,
+    moved: Optional[ArrayLike] = None,
+    *,
+    resolution: float,
+    voxel_size: None = None,
+    half_width: Optional[float] = None,
+    half_width_voxels: Optional[float] = None,
+    exterior_width_voxels: Optional[float] = None,
+    interior_width_voxels: Optional[float] = None,
+    method: _Method = "exact",
+    sign: _Sign = "auto",
+    gap_voxels: float = 2,
+    unite: bool = False,
+    triangles: bool = False,
+    threads: int = 0,
+    delta: float = 0.5,
+    epsilon: float = 1,
+    neighbourhood: int = 2,
+    max_subdivision: int = 32,
+    progress: Optional[_Progress] = None,
+) -> LevelSet: ...
+@overload
+def rebuild(
+    level_set: LevelSet,
+    old_mesh: MeshLike,
+    new_mesh: MeshLike,
+    moved: Optional[ArrayLike] = None,
+    *,
+    resolution: None = None,
+    voxel_size: float,
+    half_width: Optional[float] = None,
+    half_width_voxels: Optional[float] = None,
+    exterior_width_voxels: Optional[float] = None,
+    interior_width_voxels: Optional[float] = None,
+    method: _Method = "exact",
+    sign: _Sign = "auto",
+    gap_voxels: float = 2,
+    unite: bool = False,
+    triangles: bool = False,
+    threads: int = 0,
+    delta: float = 0.5,
+    epsilon: float = 1,
+    neighbourhood: int = 2,
+    max_subdivision: int = 32,
     progress: Optional[_Progress] = None,
 ) -> LevelSet: ...
 def devices() -> List[Dict[str, Any]]: ...
-def mass_properties(solid: Any) -> MassProperties: ...
+def mass_properties(solid: Union[LevelSet, MeshLike]) -> MassProperties: ...
 def with_body(
     level_set: LevelSet,
-    mesh: _MeshLike,
+    mesh: MeshLike,
     *,
     point_spacing_voxels: float = 2,
     margin: Optional[float] = None,
-    accuracy: str = "exact-near-features",
+    accuracy: _Accuracy = "exact-near-features",
     keep_mesh: bool = True,
 ) -> LevelSet: ...
 def collide(
@@ -280,7 +398,7 @@ def collide(
     motion_b: Optional[ArrayLike] = None,
     min_normal_cosine: float = 0.3,
     min_normal_cosine_apart: float = 0.9,
-    keeps_oblique_edges: bool = False,
+    keep_oblique_edges: bool = False,
     reduced: bool = False,
     cache: Optional[ContactCache] = None,
 ) -> Contacts: ...
@@ -296,7 +414,7 @@ def distance(
 ) -> BodyDistance: ...
 def distances(
     colliders: Union[Collider, Sequence[Collider]],
-    poses: Sequence[_PoseLike],
+    poses: Union[Sequence[_PoseLike], NDArray[Any]],
     pairs: ArrayLike,
     max_distance: float = ...,
 ) -> _Floats: ...
@@ -315,10 +433,10 @@ def time_of_impact(
 ) -> Impact: ...
 def seed(
     liquid: LevelSet,
-    body: Any,
+    body: Union[LevelSet, MeshLike],
     pose: _PoseLike = None,
     scale: ArrayLike = 1,
-    mode: str = "unite",
+    mode: _Mode = "unite",
     unite_solids: bool = True,
 ) -> Seeded: ...
 def particles(
@@ -330,7 +448,7 @@ def particles(
     seed: int = 0,
 ) -> _Floats: ...
 def obstacle(
-    solid: Any,
+    solid: Union[LevelSet, MeshLike],
     voxel_size: float,
     pose: _PoseLike = None,
     scale: ArrayLike = 1,

@@ -4,19 +4,22 @@
 from __future__ import annotations
 
 from numbers import Integral, Real
-from typing import Any, Sequence
+from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from bilayer._bilayer import Mesh
 
+if TYPE_CHECKING:
+    from bilayer._bilayer import MeshLike
+
 _ACCEPTED = (
     "a bilayer.Mesh, an object with .vertices and .faces (trimesh) or .triangles (Open3D), an Open3D tensor mesh, "
-    "a meshio mesh, or a pair (vertices, faces)"
+    "a meshio mesh, a PyVista PolyData, or a pair (vertices, faces)"
 )
 
 
-def as_mesh(source: Any) -> Mesh:
+def as_mesh(source: MeshLike) -> Mesh:
     """as_mesh(source) -> Mesh
 
     Takes the vertices and faces of a mesh of another package, which is not imported:
@@ -24,6 +27,7 @@ def as_mesh(source: Any) -> Mesh:
     - anything with .vertices and .faces, as trimesh;
     - Open3D: .vertices and .triangles of a legacy mesh, .vertex.positions and .triangle.indices of a tensor mesh;
     - meshio: .points and .cells, of which triangles and quads are taken;
+    - PyVista: .points and .faces of a PolyData of triangles and quads;
     - a pair (vertices, faces).
 
     Raises ValueError for anything else, and as Mesh does.
@@ -32,19 +36,43 @@ def as_mesh(source: Any) -> Mesh:
     >>> bilayer.as_mesh(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
     Mesh(3 vertices, 1 faces)
     """
+    return mesh_of(source, "source")
+
+
+def mesh_of(source: Any, name: str) -> Mesh:
+    """As as_mesh(), for an argument of this name."""
     if isinstance(source, Mesh):
         return source
+    try:
+        arrays = _arrays(source)
+    except (AttributeError, IndexError, KeyError, TypeError) as error:
+        raise ValueError(f"{name}: expected {_ACCEPTED}, got a '{_type(source)}' whose data are others") from error
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
+    if arrays is None:
+        raise ValueError(f"{name}: expected {_ACCEPTED}, got a '{_type(source)}'")
+    return Mesh(*arrays)
+
+
+def _arrays(source: Any) -> Optional[Tuple[Any, Any]]:
+    """The vertices and faces of any mesh; None of something else."""
     if hasattr(source, "vertices") and hasattr(source, "faces"):
-        return Mesh(source.vertices, source.faces)
+        return source.vertices, source.faces
     if hasattr(source, "vertices") and hasattr(source, "triangles"):
-        return Mesh(np.asarray(source.vertices), np.asarray(source.triangles))
+        return np.asarray(source.vertices), np.asarray(source.triangles)
     if hasattr(source, "vertex") and hasattr(source, "triangle"):
-        return Mesh(_host(source.vertex["positions"]), _host(source.triangle["indices"]))
+        return _host(source.vertex["positions"]), _host(source.triangle["indices"])
+    if hasattr(source, "points") and hasattr(source, "faces"):
+        return np.asarray(source.points), _polydata_faces(source.faces)
     if hasattr(source, "points") and hasattr(source, "cells"):
-        return Mesh(source.points, _meshio_faces(source.cells))
+        return source.points, _meshio_faces(source.cells)
     if isinstance(source, (tuple, list)) and len(source) == 2:
-        return Mesh(source[0], source[1])
-    raise ValueError(f"mesh: expected {_ACCEPTED}, got a '{type(source).__name__}'")
+        return source[0], source[1]
+    return None
+
+
+def _type(source: Any) -> str:
+    return type(source).__name__
 
 
 def _host(tensor: Any) -> Any:
@@ -54,21 +82,42 @@ def _host(tensor: Any) -> Any:
     return tensor.numpy() if hasattr(tensor, "numpy") else tensor
 
 
+def _polydata_faces(faces: Any) -> Any:
+    """The triangles of PyVista's flat list: the number of corners, then the corners, face by face."""
+    flat = np.asarray(faces)
+    if flat.ndim != 1 or (flat.size and flat.dtype.kind not in "iu"):
+        raise ValueError("expected .faces as flat integers [3, a, b, c, ...] next to .points")
+    triangles: List[Any] = []
+    quads: List[Any] = []
+    at = 0
+    if flat.size % 4 == 0 and np.all(flat[::4] == 3):  # without a loop, which is slow
+        return flat.reshape(-1, 4)[:, 1:]
+    while at < flat.size:
+        count = int(flat[at])
+        corners = flat[at + 1 : at + 1 + count]
+        if count not in (3, 4) or corners.size != count:
+            raise ValueError(f"expected .faces of 3 or 4 corners, got one of {count}: use triangulate()")
+        (triangles if count == 3 else quads).append(corners)
+        at += 1 + count
+    return _split(triangles, quads)
+
+
 def _meshio_faces(cells: Any) -> Any:
-    """The triangles of meshio's blocks of cells; each quad gives two."""
-    blocks = cells.items() if isinstance(cells, dict) else [(block.type, block.data) for block in cells]
-    faces = []
-    for kind, data in blocks:
-        corners = np.asarray(data)
-        if kind == "triangle":
-            faces.append(corners)
-        elif kind == "quad":
-            faces.append(corners[:, [0, 1, 2]])
-            faces.append(corners[:, [0, 2, 3]])
-    if not faces:
+    """The triangles of meshio's blocks of cells."""
+    blocks = list(cells.items()) if isinstance(cells, dict) else [(block.type, block.data) for block in cells]
+    triangles = [np.asarray(data) for kind, data in blocks if kind == "triangle"]
+    quads = [np.asarray(data) for kind, data in blocks if kind == "quad"]
+    if not triangles and not quads:
         kinds = ", ".join(f"'{kind}'" for kind, _ in blocks)
-        raise ValueError(f"mesh: expected cells of type 'triangle' or 'quad', got {kinds or 'none'}")
-    return np.concatenate(faces)
+        raise ValueError(f"expected cells of type 'triangle' or 'quad', got {kinds or 'none'}")
+    return _split(triangles, quads)
+
+
+def _split(triangles: Sequence[Any], quads: Sequence[Any]) -> Any:
+    """All triangles, and two of each quad."""
+    both = [np.reshape(faces, (-1, 3)) for faces in triangles]
+    corners = [np.reshape(faces, (-1, 4)) for faces in quads]
+    return np.concatenate(both + [quad[:, side] for quad in corners for side in ([0, 1, 2], [0, 2, 3])])
 
 
 def box(size: Sequence[float] = (1, 1, 1)) -> Mesh:

@@ -19,7 +19,12 @@ Bools = NDArray[np.bool_]
 
 
 class Samples(NamedTuple):
-    """Field.sample(): arrays of the points' shape."""
+    """Field.sample(): arrays of the points' leading shape (...). A tuple, so that it can be unpacked.
+
+    distance: float32 (...), signed; outside the band a bound with the right sign.
+    gradient: float32 (..., 3), of length near 1; zero outside the band.
+    in_band: bool (...), whether all eight voxels around the point are in the band.
+    """
 
     distance: Floats
     gradient: Floats
@@ -27,7 +32,16 @@ class Samples(NamedTuple):
 
 
 class ClosestPoints(NamedTuple):
-    """Field.closest(): arrays of the points' shape."""
+    """Field.closest(): arrays of the points' leading shape (...). A tuple, so that it can be unpacked.
+
+    distance: float32 (...), negative inside; inf where nothing was found.
+    position: float32 (..., 3), on the surface, relative to Field.origin; nan where nothing was found.
+    normal: float32 (..., 3), outward, of length 1; nan where nothing was found.
+    triangle: int32 (...), index of the face; -1 without a mesh and where nothing was found.
+    feature: uint8 (...): 0 face, 1 edge, 2 vertex.
+    feature_index: uint8 (...), which edge of the face, from that corner to the next, or which corner.
+    found: bool (...), False where the surface is farther than max_distance.
+    """
 
     distance: Floats
     position: Floats
@@ -39,7 +53,16 @@ class ClosestPoints(NamedTuple):
 
 
 class Hits(NamedTuple):
-    """Field.raycast(), sphere_cast() and segment(): arrays of the rays' shape."""
+    """Field.raycast(), sphere_cast() and segment(): arrays of the rays' leading shape (...). A tuple, so that it can be
+    unpacked: its length is that of the tuple, not the number of rays.
+
+    hit: bool (...).
+    distance: float32 (...), a length in the mesh's unit; 0 for a start inside, inf without a hit.
+    position: float32 (..., 3), on the surface, relative to Field.origin; the start itself for a start inside;
+    nan without a hit.
+    normal: float32 (..., 3), outward, of length 1; the reversed direction for a start inside; nan without a hit.
+    triangle: int32 (...), index of the face; -1 without a mesh or a hit, and for a start inside.
+    """
 
     hit: Bools
     distance: Floats
@@ -48,8 +71,33 @@ class Hits(NamedTuple):
     triangle: Ints
 
 
-class Contacts(NamedTuple):
-    """collide(): arrays of one entry per contact, and two counts."""
+class _Fields:
+    """Values that compare field by field, arrays included."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(np.array_equal(value, getattr(other, name)) for name, value in vars(self).items())
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts(_Fields):
+    """collide(): one entry of each array for each of N contacts. Its length is N, so that it is true if there are any.
+
+    position: float32 (N, 3), on the surface of b, in the world of the poses.
+    normal: float32 (N, 3), of length 1, from b to a.
+    distance: float32 (N,), the separation in the meshes' unit; negative where the bodies penetrate.
+    feature: uint32 (N,), which surface point, or the number of points plus which sharp edge; the top bit is set for
+    those of b.
+    approach: float32 (N,), by how much the motions reduce the distance, in the meshes' unit; 0 for motions within the
+    margin.
+    turning_radius: float32 (N,), rounding radius of the vertex or edge that the contact stays on while its body
+    rotates, in the meshes' unit; negative where the contact moves along as the surfaces roll.
+    points_tested: int, surface points that were sampled in the other body's field.
+    beyond_band: int, those of them that are too deep inside for the band, and make no contact.
+    """
 
     position: Floats
     normal: Floats
@@ -60,9 +108,20 @@ class Contacts(NamedTuple):
     points_tested: int
     beyond_band: int
 
+    def __len__(self) -> int:
+        return len(self.distance)
+
 
 class BodyDistance(NamedTuple):
-    """distance(): of two bodies."""
+    """distance(): the closest points of two bodies, in the world of the poses.
+
+    found: bool, False if the bodies are farther apart than max_distance; the other fields are then invalid.
+    overlap: str: "none", "surfaces", "a inside b" or "b inside a".
+    distance: float, the separation, or minus the penetration depth, in the meshes' unit.
+    position_a, position_b: float32 (3,), the closest points.
+    normal: float32 (3,), of length 1, from b to a.
+    triangle_a, triangle_b: int, faces of the closest points; -1 where not known.
+    """
 
     found: bool
     overlap: str
@@ -75,7 +134,13 @@ class BodyDistance(NamedTuple):
 
 
 class Impact(NamedTuple):
-    """time_of_impact(): of two moving bodies, their poses and distance when they touch."""
+    """time_of_impact(): when two moving bodies touch.
+
+    found: bool, False if they do not touch in the whole motion; the other fields are then invalid.
+    fraction: float, of the motion until they touch, 0 to 1.
+    pose_a, pose_b: Pose, at that time.
+    distance: BodyDistance, at that time; of a penetration only its place and normal count.
+    """
 
     found: bool
     fraction: float
@@ -85,7 +150,14 @@ class Impact(NamedTuple):
 
 
 class MassProperties(NamedTuple):
-    """mass_properties(): for density 1."""
+    """mass_properties() and Collider.mass, for density 1.
+
+    volume: float.
+    centre: float32 (3,), the centre of mass, in the coordinates of Mesh.vertices.
+    inertia: float32 (3, 3), the inertia tensor about the centre of mass.
+    principal_inertia: float32 (3,), ascending.
+    principal_axes: float32 (4,), the quaternion w, x, y, z that rotates the principal axes to those of the mesh.
+    """
 
     volume: float
     centre: Floats
@@ -95,7 +167,12 @@ class MassProperties(NamedTuple):
 
 
 class Dense(NamedTuple):
-    """LevelSet.to_numpy(): values[i, j, k] is the distance at origin + spacing * (i, j, k)."""
+    """LevelSet.to_numpy(): values[i, j, k] is the distance at origin + spacing * (i, j, k).
+
+    values: float32 (nx, ny, nz), negative inside.
+    origin: float64 (3,), the centre of values[0, 0, 0]; relative to LevelSet.origin, as the points of queries.
+    spacing: float, the voxel size.
+    """
 
     values: Floats
     origin: Doubles
@@ -103,7 +180,14 @@ class Dense(NamedTuple):
 
 
 class Sparse(NamedTuple):
-    """LevelSet.sparse(): values[n] is the distance at origin + spacing * coordinates[n]."""
+    """LevelSet.sparse(): values[n] is the distance at origin + spacing * coordinates[n].
+
+    coordinates: int32 (N, 3), indices of the active voxels.
+    values: float32 (N,), negative inside.
+    triangles: int32 (N,), the nearest faces; None without them.
+    origin: float64 (3,), zero; relative to LevelSet.origin, as the points of queries.
+    spacing: float, the voxel size.
+    """
 
     coordinates: Ints
     values: Floats
@@ -113,7 +197,13 @@ class Sparse(NamedTuple):
 
 
 class Seeded(NamedTuple):
-    """seed(): the new liquid, and how far distances were changed to make it a level set."""
+    """seed(): the new liquid, and how far distances were changed to make it a level set.
+
+    liquid: LevelSet.
+    max_change_voxels: float, the largest change of a distance, near creases, in voxels.
+    where: float64 (3,), the centre of that voxel, relative to LevelSet.origin.
+    changed_voxels: int, voxels that changed by more than 0.1 voxels.
+    """
 
     liquid: LevelSet
     max_change_voxels: float
@@ -121,11 +211,31 @@ class Seeded(NamedTuple):
     changed_voxels: int
 
 
-@dataclass(frozen=True)
-class MeshReport:
+@dataclass(frozen=True, eq=False)
+class MeshReport(_Fields):
     """inspect(): a mesh is closed, oriented and clean if every count of defects is zero.
 
-    Lengths are in the mesh's unit; `bounds` has shape (2, 3), relative to `origin`.
+    Lengths are in the mesh's unit.
+
+    vertices, faces: int. Vertices with equal coordinates count as one.
+    components: int, sets of faces that are connected by vertices.
+    bounds: float32 (2, 3), lower and upper corner, in the coordinates of Mesh.vertices.
+    origin: float64 (3,): Mesh.origin.
+    boundary_edges: int, edges with one face; boundary_loops: int, the holes that they surround.
+    non_manifold_edges: int, edges with three or more faces.
+    misoriented_edges: int, edges that faces do not use equally often in both directions.
+    degenerate_triangles: int, faces with zero area.
+    duplicate_triangles: int, faces with the same three vertices as an earlier one.
+    non_manifold_vertices: int, vertices whose faces form several fans.
+    self_intersections: int, pairs of faces that intersect and share no edge.
+    flipped_triangles: int, faces that build() would flip, to orient the mesh.
+    inside_out_components: int, closed components with reversed orientation; cavities do not count.
+    thinnest_wall: float, minimum thickness of the solid behind a face; 0: none found.
+    common_wall: float, the same without the thinnest hundredth of the area: without creases and convex vertices.
+    thin_walls: int, faces with less than `wall` of solid behind them.
+    area: float. volume: float, signed; it has a meaning only for a closed mesh.
+    closed: bool, no boundary and no non-manifold edges. oriented: bool, no misoriented edges or components inside out.
+    verdict: str, all of that in words.
     """
 
     vertices: int
@@ -151,14 +261,3 @@ class MeshReport:
     closed: bool
     oriented: bool
     verdict: str
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, MeshReport):
-            return NotImplemented
-        return all(_same(value, getattr(other, name)) for name, value in vars(self).items())
-
-    __hash__ = None  # type: ignore[assignment]
-
-
-def _same(a: Any, b: Any) -> bool:
-    return bool(np.array_equal(a, b))

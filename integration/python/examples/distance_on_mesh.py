@@ -1,48 +1,57 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The exact distance to one mesh, coloured on a second mesh: where two parts come close."""
+"""The exact distance to one mesh, coloured on a second mesh: where two parts come close.
+
+The picture is drawn by rays through its pixels, by Field.raycast().
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np
 from common import arguments, save
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import bilayer
 
-mesh, given = arguments(__doc__, "distance_on_mesh.png")
-level_set = bilayer.build(mesh, resolution=128)
-field = bilayer.Field(level_set, mesh)
+PIXELS, HALF_WIDTH = 900, 0.64
 
+mesh, given = arguments(__doc__.splitlines()[0], "distance_on_mesh.png")
 sphere = bilayer.sphere(0.36, subdivisions=5)
-distance = field.closest(sphere.vertices).distance[sphere.faces].mean(axis=1)
+field, ball = (bilayer.Field(bilayer.build(one, resolution=128), one) for one in (mesh, sphere))
+distance = field.closest(sphere.vertices).distance
+print(f"from {distance.min():.3f} to {distance.max():.3f} on the second mesh")
+
+# parallel rays from the camera, through a grid of points around zero
+back = np.array([0.5, 0.3, 1.0]) / np.linalg.norm([0.5, 0.3, 1.0])  # y is up
+right = np.cross([0, 1, 0], back) / np.linalg.norm(np.cross([0, 1, 0], back))
+up = np.cross(back, right)
+along = np.linspace(-HALF_WIDTH, HALF_WIDTH, PIXELS)
+x, y = np.meshgrid(along, along[::-1])
+origins = x[..., None] * right + y[..., None] * up + 2 * back
+light = np.array([0.3, 0.8, 0.5]) / np.linalg.norm([0.3, 0.8, 0.5])
 limit = np.abs(distance).max()
-colours = plt.cm.RdBu_r(0.5 + 0.5 * distance / limit)
 
 
-def shaded(mesh):
-    """Grey, lighter where faces point up."""
-    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    up = normals[:, 2] / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)
-    return plt.cm.gray(0.5 + 0.3 * up)
+def picture(bodies):
+    """The colours of the nearest hits: the ball by its distance to the mesh, the mesh in grey."""
+    image, nearest = np.ones((PIXELS, PIXELS, 3)), np.full((PIXELS, PIXELS), np.inf)
+    for body in bodies:
+        hits = body.raycast(origins, -back)
+        seen = hits.distance < nearest
+        nearest[seen] = hits.distance[seen]
+        shade = 0.65 + 0.35 * np.clip(hits.normal[seen] @ light, -0.5, 1)
+        if body is ball:
+            there = field.closest(hits.position[seen]).distance
+            image[seen] = shade[:, None] * plt.cm.RdBu_r(0.5 + 0.5 * there / limit)[:, :3]
+        else:
+            image[seen] = 0.75 * shade[:, None]
+    return image
 
 
-figure = plt.figure(figsize=(11, 5.5))
-coarse = level_set.surface(adaptivity=0.1)  # enough for a picture
-both = np.concatenate([sphere.vertices[sphere.faces], coarse.vertices[coarse.faces]])
-for place, corners, paint, title in (
-    (1, both, np.concatenate([colours, shaded(coarse)]), "both meshes"),
-    (2, sphere.vertices[sphere.faces], colours, "the second mesh alone"),
-):
-    axes = figure.add_subplot(1, 2, place, projection="3d")
-    turned = corners[..., [2, 0, 1]]  # y is up
-    axes.add_collection3d(Poly3DCollection(turned, facecolors=paint, edgecolors=paint, linewidths=0.3))
-    axes.set(xlim=(-0.37, 0.37), ylim=(-0.37, 0.37), zlim=(-0.37, 0.37), box_aspect=(1, 1, 1))
-    axes.set_title(title, y=0)
-    axes.view_init(15, 15)
+figure, panels = plt.subplots(1, 2, figsize=(11, 5.2))
+for axes, bodies, title in zip(panels, ((field, ball), (ball,)), ("both meshes", "the second mesh alone")):
+    axes.imshow(picture(bodies), interpolation="lanczos")
+    axes.set_title(title, y=-0.05)
     axes.set_axis_off()
 figure.subplots_adjust(left=0, right=0.88, wspace=0)
 scale = plt.cm.ScalarMappable(plt.Normalize(-limit, limit), "RdBu_r")
 bar = figure.add_axes((0.9, 0.2, 0.02, 0.6))
 figure.colorbar(scale, cax=bar, label="distance to the other mesh, negative inside it")
-print(f"from {distance.min():.3f} to {distance.max():.3f} on the second mesh")
 save(figure, given.output)
