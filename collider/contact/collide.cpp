@@ -27,14 +27,31 @@ glm::vec3 outwardNormal(const Placed& other, const SurfaceSample& sample, const 
     return sample.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * sample.normal;
 }
 
-// The outward normal of the surface near a place in the world, by the triangles if the field has them: samples within a
-// voxel of an edge are oblique on either side. Zero where the field has no normal.
-glm::vec3 normalNear(const Placed& body, const glm::vec3& place) {
+// A point's plane crosses an edge if the normal of the other surface changes from here to this far beyond by more than
+// 25 degrees (cosine) [voxels]. Samples are too smooth within a voxel of an edge. Elsewhere they are better than the
+// normals of facets.
+constexpr float beyondEdge = 1.5f, sharpCosine = 0.9f;
+
+// The outward normal of the surface near a place in the world; zero where the field has none.
+// @param byTriangles  if the field has them
+glm::vec3 normalNear(const Placed& body, const glm::vec3& place, bool byTriangles) {
     const glm::vec3 at = body.pose.toBody(place) / body.scale;
-    const Field& field = body.collider.field();
+    const ContactField surface(body.collider, false);
+    const Field& field = surface.field();
     const Sample sample = field.sample(at);
     if (!sample.inBand) return glm::vec3(0);
-    return body.pose.rotation * surfaceSampleAt(field, at, sample, field.mesh() != nullptr).normal;
+    const bool isExact = byTriangles && field.mesh();
+    const SurfaceSample there = isExact ? surfaceSampleAt(field, at, sample, true) : surface.inBand(at, sample);
+    return body.pose.rotation * there.normal;
+}
+
+// The same, by the triangles next to an edge.
+// @param outward  the direction in which the edge is
+glm::vec3 normalNearEdge(const Placed& body, const glm::vec3& place, const glm::vec3& outward) {
+    const float reach = beyondEdge * body.scale * body.collider.field().voxelSize();
+    const glm::vec3 here = normalNear(body, place, true);
+    const bool isEdge = glm::dot(here, normalNear(body, place + reach * outward, true)) < sharpCosine;
+    return isEdge ? here : normalNear(body, place, false);
 }
 
 // Adds the contacts of A's points in the field of B, then of B's points in the field of A, as the visits find them.
@@ -46,9 +63,11 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
                             const SurfaceSample& sample) {
         const glm::vec3 own = body.pose.rotation * point.normal;
         const auto facesEdge = [&] {
+            const auto normalAt = [&](const glm::vec3& place) {
+                return normalNearEdge(other, place, glm::normalize(normal - glm::dot(normal, own) * own));
+            };
             return facesEdgeObliquely(body.pose.toWorld(body.scale * point.position), own,
-                                      sample.distance * other.scale, normal,
-                                      [&](const glm::vec3& place) { return normalNear(other, place); });
+                                      sample.distance * other.scale, normal, normalAt);
         };
         return passesNormalFilter(options, normal, own, body.motion.rotation - other.motion.rotation,
                                   sample.distance > 0 && !point.isSharp, facesEdge);
