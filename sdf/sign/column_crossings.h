@@ -3,7 +3,8 @@
 // crossings from below are winding numbers, exactly, if the mesh is closed.
 //
 // Columns are exact lines in the lattice. A column that hits an edge counts as displaced by an infinitesimal amount,
-// the same for all triangles. Tested by tests/sdf/sign_repair.cpp through build().
+// the same for all triangles.
+// Tested by tests/sdf/sign_repair.cpp through build().
 #pragma once
 
 #include <algorithm>
