@@ -2,9 +2,11 @@
 #include "sdf/grid/field_filler.h"
 
 #include <fmt/format.h>
+#include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -165,6 +167,24 @@ void FieldFiller::fillWithSidesOfLast(const Mesh& mesh, const std::string& reaso
         };
     });
     signs_ = signs;
+}
+
+// With equal widths on both sides, the active voxels do not depend on the signs. The sides of a closed mesh follow from
+// its triangles alone.
+bool FieldFiller::signAgainByWinding(const Mesh& mesh, const std::string& reason) {
+    Stopwatch part;
+    const BandWidths widths = bandOf(options_);
+    const bool isComplete = enclosesSurface(options_) && widths.exterior == widths.interior && !part_;
+    if (!isComplete || options_.unite || !balanced(mesh, &progress_)) return false;
+    openvdb::tree::LeafManager<openvdb::FloatTree> leaves(distance_->tree());
+    leaves.foreach ([](auto& leaf, std::size_t) {
+        float* values = leaf.buffer().data();
+        std::transform(values, values + blockVoxels, values, [](float value) { return std::abs(value); });
+    });
+    signByWinding(*distance_, mesh, widths, true, &progress_);
+    signs_ = {nameOf(Sign::winding), reason, 0, 0};
+    times_.assemble += part.lap();
+    return true;
 }
 
 // The normals of a balanced mesh that self-intersects can be wrong without a conflict, where two walls are near all

@@ -62,6 +62,8 @@ void fillWithAutomaticSign(FieldFiller& filler) {
             return;
         }
         choice = std::move(*other);
+        const bool staysWhole = choice.sign == Sign::winding && !choice.repaired && !borrows;
+        if (staysWhole && filler.signAgainByWinding(mesh, choice.reason)) return;
         if (!choice.repaired && repaired) choice.repaired = *repaired;
     }
 }

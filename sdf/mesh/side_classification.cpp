@@ -17,8 +17,9 @@ namespace {
 
 /// Count of sample points for a whole mesh; shares of its area are then accurate to about 2 %.
 constexpr std::size_t samplesOfMesh = 512;
-/// Lines through each point, each with two opposite rays; winding numbers are then accurate to about 0.05.
-constexpr std::size_t linesPerSample = 32;
+/// Lines through each point, each with two opposite rays; winding numbers are then accurate to about 0.05. In a closed
+/// mesh each ray finds the number, unless it hits an edge exactly. A mean of eight rays is accurate in spite of one.
+constexpr std::size_t linesPerSample = 32, linesIfClosed = 4;
 /// A winding number that differs from 1/2 by less than this is undecided: three times the error.
 constexpr double unclear = 0.15;
 /// Max distance of surfaces that coincide up to the rounding of coordinates, relative to the max coordinate: half a
@@ -27,12 +28,12 @@ constexpr double roundingApart = 2.0 * std::numeric_limits<float>::epsilon();
 
 }  // namespace
 
-Sides::Sides(const Mesh& mesh, const TriangleTree& tree, Progress* progress)
+Sides::Sides(const Mesh& mesh, const TriangleTree& tree, Progress* progress, bool closed)
     : mesh_(mesh),
       tree_(tree),
       progress_(progress),
       samePlace_(roundingApart * double(tree.largestCoordinate())),
-      directions_(spreadDirections(linesPerSample)) {}
+      directions_(spreadDirections(closed ? linesIfClosed : linesPerSample)) {}
 
 double Sides::area(unsigned triangle) const {
     const glm::uvec3& t = mesh_.triangles[triangle];
@@ -104,11 +105,11 @@ void Sides::add(unsigned triangle, std::size_t sample, Bounding& sum) const {
         ++sum.nothing;
 }
 
-Bounding bounding(const Mesh& mesh, Progress* progress) {
+Bounding bounding(const Mesh& mesh, Progress* progress, bool closed) {
     const TriangleTree tree(mesh, progress);
     std::vector<unsigned> all(mesh.triangles.size());
     std::iota(all.begin(), all.end(), 0u);
-    return Sides(mesh, tree, progress).measure(all, samplesOfMesh);
+    return Sides(mesh, tree, progress, closed).measure(all, samplesOfMesh);
 }
 
 }  // namespace bilayer::detail

@@ -28,7 +28,8 @@ struct Bounding {
 class Sides {
   public:
     /// @param progress  polled, unless null
-    Sides(const Mesh& mesh, const TriangleTree& tree, Progress* progress = nullptr);
+    /// @param closed    whether the mesh is balanced, so that few lines suffice
+    Sides(const Mesh& mesh, const TriangleTree& tree, Progress* progress = nullptr, bool closed = false);
 
     /// Classifies some of the triangles at `samples` points, each of which represents an equal share of their area.
     /// Deterministic.
@@ -47,6 +48,7 @@ class Sides {
 
 /// Classifies a mesh as a whole. The mesh must be valid.
 /// @param progress  polled, unless null
-Bounding bounding(const Mesh& mesh, Progress* progress = nullptr);
+/// @param closed    whether the mesh is balanced, so that few lines suffice
+Bounding bounding(const Mesh& mesh, Progress* progress = nullptr, bool closed = false);
 
 }  // namespace bilayer::detail

@@ -37,7 +37,8 @@ class SurfacePieces {
 
     /// Finds the contacts. Keeps a reference to the mesh, which must be valid.
     /// @param slack     surfaces closer than this count as touching, relative to the max coordinate; above the rounding
-    ///                  of doubles
+    ///                  of doubles. Triangles are cut where others come this close, and labelled by the winding numbers
+    ///                  at this distance. Labels are thus constant within pieces.
     /// @param progress  polled, unless null
     SurfacePieces(const Mesh& mesh, double slack, Progress* progress);
 

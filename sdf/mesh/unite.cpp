@@ -9,12 +9,10 @@
 namespace bilayer::detail {
 namespace {
 
-/// Surfaces closer than this count as touching, relative to the max coordinate: one unit in the last place of a float.
-/// Walls between solids that lie flush but for rounding are then removed.
+/// Surfaces closer than this count as touching, relative to the max coordinate. Rounding to floats moves two flush
+/// surfaces apart by at most sqrt(3) units in the last place, 2.1e-7. The walls between them are removed.
 constexpr double touching = 2.5e-7;
-/// The same where surfaces lie exactly where their floats say. Pieces of two surfaces may disagree on whether they
-/// touch if the surfaces are nearly this close. Below, winding numbers on the two sides of slivers would be rounding
-/// noise.
+/// The same where surfaces lie exactly where their floats say: above the rounding of doubles.
 constexpr double coincident = 2e-12;
 
 }  // namespace

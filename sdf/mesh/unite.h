@@ -22,8 +22,8 @@ struct UnionSurface {
 
 /// Removes the surfaces inside of the union of all solids of a mesh, that is, surfaces with a winding number above 1/2
 /// on both sides. Triangles that intersect or touch others are first cut along the intersections; then the buried
-/// pieces are removed. The result is exact up to the rounding of floats: surfaces closer to each other than 2e-7 of the
-/// max coordinate count as touching. The winding numbers of the given mesh determine the two sides of the result.
+/// pieces are removed. The result is exact up to the rounding of floats: surfaces closer to each other than 2.5e-7 of
+/// the max coordinate count as touching. The winding numbers of the given mesh determine the two sides of the result.
 ///
 /// Open surfaces and the surfaces of inside-out solids stay. Call orient() first if the orientation is not reliable. A
 /// mesh without buried surfaces is returned bit-identical. The bytes of the result do not depend on the count of

@@ -107,6 +107,7 @@ BlockMask farther(const BandLeaf& leaf, float limit) {
 
 void signLeaf(BandLeaf& leaf, const BlockMask& inside, const BandWidths& widths) {
     const float exterior = widths.exterior * widths.voxelSize, interior = widths.interior * widths.voxelSize;
+    const float edge = bandEdge * widths.voxelSize;
     float* values = leaf.buffer().data();
     BandLeaf::NodeMaskType active;
     for (std::size_t x = 0; x < blockSide; ++x) {
@@ -115,8 +116,10 @@ void signLeaf(BandLeaf& leaf, const BlockMask& inside, const BandWidths& widths)
             float& value = values[x * 64 + i];
             const bool in = (inside[x] >> i) & 1;
             const float width = in ? interior : exterior;
-            band |= std::uint64_t(value < width) << i;
-            value = in ? -std::min(value, width) : std::min(value, width);
+            const bool isInBand = value < width - edge;
+            band |= std::uint64_t(isInBand) << i;
+            if (!isInBand) value = width;
+            if (in) value = -value;
         }
         active.getWord<std::uint64_t>(openvdb::Index(x)) = band;
     }

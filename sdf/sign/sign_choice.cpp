@@ -58,12 +58,12 @@ std::string flipped(const Orientation& orientation) {
 SignChoice chooseFor(Orientation orientation, std::string trouble, Progress* progress) {
     SignChoice choice;
     trouble += flipped(orientation);
-    const bool closedByTurning = orientation.flippedTriangles > 0 && balanced(orientation.mesh, progress);
+    const bool closed = balanced(orientation.mesh, progress);
     const bool oneSided = 2 * orientation.oneSidedTriangles > orientation.mesh.triangles.size();
-    const Bounding share = bounding(orientation.mesh, progress);
+    const Bounding share = bounding(orientation.mesh, progress, closed);
     const bool separates = !oneSided && share.nothing + share.reversed <= maxIdle;
     if (orientation.flippedTriangles) choice.repaired = std::move(orientation.mesh);
-    choice.sign = !separates ? Sign::flood : closedByTurning ? Sign::normals : Sign::winding;
+    choice.sign = !separates ? Sign::flood : closed && choice.repaired ? Sign::normals : Sign::winding;
     if (choice.sign == Sign::normals)
         choice.reason =
             fmt::format("closed, and oriented after {} triangles were flipped", orientation.flippedTriangles);
@@ -130,7 +130,8 @@ SignChoice chooseSign(const Mesh& mesh, Progress* progress) {
 
 SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress) {
     const SignChoice choice = chooseSign(mesh, progress);
-    if (choice.sign != Sign::normals || choice.repaired || bounding(mesh, progress).nothing <= maxIdle) return choice;
+    if (choice.sign != Sign::normals || choice.repaired || bounding(mesh, progress, true).nothing <= maxIdle)
+        return choice;
     return chooseFor(orient(mesh, progress), "closed and oriented, but of two-sided open surfaces", progress);
 }
 

@@ -23,8 +23,8 @@
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "tests/collider/mass_formulas.h"
+#include "tests/collider/union_boxes.h"
 #include "tests/support/analytic.h"
-#include "tests/support/cells.h"
 #include "tests/support/clean.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -76,25 +76,6 @@ LevelSet withGrid(const LevelSet& field, auto change) {
 glm::mat4 randomMotion(Random& random) {
     const glm::quat turn = glm::angleAxis(float(random(0, 6.28)), random.direction());
     return glm::translate(glm::mat4(1), random.point(3)) * glm::mat4_cast(turn);
-}
-
-// Union of overlapping boxes: the surface of all cells between their face planes that lie in one of them.
-Mesh surfaceOfUnion(const std::vector<Bounds>& boxes) {
-    Planes cuts;
-    for (const Bounds& box : boxes)
-        for (int axis = 0; axis < 3; ++axis)
-            for (const float cut : {box.lower[axis], box.upper[axis]}) cuts[std::size_t(axis)].push_back(cut);
-    for (auto& some : cuts) std::sort(some.begin(), some.end());
-    return solidOf(cuts, [&](const glm::ivec3& cell) {
-        glm::vec3 middle(0);
-        for (int axis = 0; axis < 3; ++axis) {
-            const float* const cut = &cuts[std::size_t(axis)][std::size_t(cell[axis])];
-            middle[axis] = 0.5f * (cut[0] + cut[1]);
-        }
-        return std::any_of(boxes.begin(), boxes.end(), [&](const Bounds& box) {
-            return glm::all(glm::greaterThan(middle, box.lower)) && glm::all(glm::lessThan(middle, box.upper));
-        });
-    });
 }
 
 }  // namespace
@@ -314,19 +295,26 @@ TEST_CASE("the field of a union has the volume of the union") {
         CAPTURE(randomSeed);
         std::mt19937 random(randomSeed);
         std::uniform_real_distribution<float> place(-0.5f, 0.5f), size(0.4f, 1);
+        constexpr float voxelSize = 0.02f;
         for (int i = 0; i < 20; ++i) {
             CAPTURE(i);
             std::vector<Bounds> boxes;
-            for (int k = 2 + i % 3; k > 0; --k) {
-                const glm::vec3 lower(place(random), place(random), place(random));
-                boxes.push_back({lower, lower + glm::vec3(size(random), size(random), size(random))});
-            }
-            const LevelSet field = fieldOfUnion(boxes, 0.02f);
+            // no field resolves slots and fins narrower than two voxels
+            do {
+                boxes.clear();
+                for (int k = 2 + i % 3; k > 0; --k) {
+                    const glm::vec3 lower(place(random), place(random), place(random));
+                    boxes.push_back({lower, lower + glm::vec3(size(random), size(random), size(random))});
+                }
+            } while (smallestStep(boxes) < 2 * voxelSize);
+            const LevelSet field = fieldOfUnion(boxes, voxelSize);
             CAPTURE(field.signReason());
             const Mesh surface = surfaceOfUnion(boxes);
             const double volume = massProperties(field).volume;
-            CHECK(volume == Approx(massProperties(build(surface, {.voxelSize = 0.02f})).volume).epsilon(1e-4));
-            CHECK(volume == Approx(massProperties(surface).volume).epsilon(5e-3));
+            CHECK(volume == Approx(massProperties(build(surface, {.voxelSize = voxelSize})).volume).epsilon(1e-4));
+            // trilinear samples round an edge by less than a tenth of a square voxel
+            const double rounded = 0.1 * double(voxelSize) * double(voxelSize) * sharpEdgeLength(surface);
+            CHECK(volume == Approx(massProperties(surface).volume).margin(rounded));
         }
     }
 }

@@ -121,6 +121,27 @@ TEST_CASE("what a surface bounds is told by area") {
     }
 }
 
+TEST_CASE("few lines tell what a closed surface bounds as well as many") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> place(-0.6f, 0.6f), size(0.1f, 0.6f);
+    for (int i = 0; i < 20; ++i) {
+        CAPTURE(i);
+        std::vector<Mesh> solids;
+        for (int k = 0; k < 6; ++k) {
+            const glm::vec3 at(place(random), place(random), place(random));
+            const Mesh solid = k % 2 ? shapes::sphere(size(random), 3) : shapes::box(glm::vec3(size(random)), 2);
+            solids.push_back(shapes::moved(k == 5 ? shapes::flipped(solid) : solid, at));
+        }
+        const Mesh mesh = shapes::join(solids);
+        const Bounding few = bounding(mesh, nullptr, true), many = bounding(mesh);
+        CHECK(few.solid == Approx(many.solid).margin(0.005));
+        CHECK(few.buried == Approx(many.buried).margin(0.005));
+        CHECK(few.reversed == Approx(many.reversed).margin(0.005));
+    }
+}
+
 TEST_CASE("closed and oriented public meshes keep their normals") {
     for (const char* name : {"bunny_watertight.obj", "armadillo_100k.ply", "fandisk.obj", "cgal-cheese.off",
                              "thingi_88566.stl", "sliver_tet.ply", "dinner_plate.obj", "cgal-knot2.off",
