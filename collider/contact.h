@@ -128,7 +128,7 @@ class ContactCache {
 /// Appends the contacts between two bodies: surface points of A in the field of B, then surface points of B in the
 /// field of A, each in ascending order of points. After the points of a body come its sharp edges that reach deeper
 /// than their end points. Deterministic, and safe from any thread. Takes time proportional to the count of points near
-/// the other body.
+/// the other body. Throws std::invalid_argument for a rotation that is no unit quaternion.
 /// @param cache  null, or the cache of this pair from the last step; the contacts are the same, found faster
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
                       ContactCache* cache = nullptr);
@@ -142,7 +142,7 @@ inline ContactReport collide(const Collider& a, const Pose& poseA, const Collide
 /// Appends the contacts between two shapes; at least one of them is a collider. Two colliders make the contacts of the
 /// function above. Otherwise the features of contacts are: surface points and sharp edges of the collider as above; and
 /// numbers of the other shape's vertices, edges or triangles, which stay the same from step to step. Throws
-/// std::invalid_argument if neither is a collider, or a scale is not positive.
+/// std::invalid_argument if neither is a collider, a scale is not positive, or a rotation is no unit quaternion.
 ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactOptions& options,
                       std::vector<Contact>& contacts, ContactCache* cache = nullptr);
 

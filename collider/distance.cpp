@@ -9,6 +9,7 @@
 #include "collider/contact/body_transform.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/mesh_distance.h"
+#include "collider/contact/placed_shapes.h"
 #include "collider/field/field_data.h"
 
 namespace bilayer {
@@ -134,6 +135,7 @@ BodyDistance contained(BodyDistance deepest, Overlap overlap) {
 }  // namespace
 
 BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& options, DistanceStart* start) {
+    for (const Placed* body : {&a, &b}) requireUnitRotation(body->pose);
     const Bodies bodies{a, b, toWorld(a).into(toWorld(b))};
     const double limit = std::max(double(options.maxDistance), 0.0) / double(b.scale);
     const MeshDistance found =

@@ -59,7 +59,8 @@ struct DistanceStart {
 ///   the normal there. A larger displacement may be needed to separate the bodies.
 /// - One body inside the other: the same for the deepest surface point of the inner body.
 ///
-/// Safe from any thread, allocates nothing. The first call for a body takes some time to prepare it.
+/// Safe from any thread, allocates nothing. The first call for a body takes some time to prepare it. Throws
+/// std::invalid_argument for a rotation that is no unit quaternion.
 /// @param start  null, or where the search starts; receives the triangles of the answer
 BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& options = {},
                       DistanceStart* start = nullptr);
@@ -72,7 +73,7 @@ BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& o
 ///   body. The vertices of a rounded shape are those of its core, as deep as its radius takes them.
 /// - Triangles of a sheet have no inside: a collider that they do not cut is separated from them.
 ///
-/// Throws std::invalid_argument if neither is a collider, or a scale is not positive.
+/// Throws std::invalid_argument if neither is a collider, a scale is not positive, or a rotation is no unit quaternion.
 BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const DistanceOptions& options = {},
                       DistanceStart* start = nullptr);
 
@@ -104,8 +105,9 @@ struct Impact {
 ///
 /// By conservative advancement (B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", 1996): no point
 /// approaches faster than the bodies' velocities and the rotations at their radii allow. Takes a distance() for each
-/// step, most of which shorten the separation by a constant factor. Throws std::invalid_argument for motions that are
-/// not finite, or rotate by more than 1000 rad.
+/// step, most of which shorten the separation by a constant factor. A motion that takes more than 10,000 of them ends
+/// there, as if the bodies touched: they slide along each other by 10,000 of their gaps. Throws std::invalid_argument
+/// for motions that are not finite, or rotate by more than 1000 rad, and for rotations that are no unit quaternions.
 ///
 /// With ImpactOptions::penetration, points of either body are followed along their paths through the other one: the
 /// surface points of a collider, the vertices and edges of other shapes. A point penetrates where it gets more than a

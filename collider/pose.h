@@ -11,7 +11,7 @@ namespace bilayer {
 /// A rigid transform: body coordinates x map to rotation * x + position in the world.
 struct Pose {
     glm::vec3 position{0};           ///< [m]
-    glm::quat rotation{1, 0, 0, 0};  ///< unit quaternion; w, x, y, z
+    glm::quat rotation{1, 0, 0, 0};  ///< unit quaternion, to 1e-3; w, x, y, z
 
     /// A point of the body in world coordinates.
     glm::vec3 toWorld(const glm::vec3& point) const { return rotation * point + position; }

@@ -25,6 +25,9 @@ namespace {
 
 /// The default tolerance [voxels], and the minimum of any tolerance [sizes of the larger body].
 constexpr double defaultTolerance = 0.05, minTolerance = 1e-5;
+/// Limit of distances in a search. Bodies that slide past each other at hardly more than the tolerance need one for
+/// each of their gaps on the way, and nothing limits the way.
+constexpr int maxDistances = 10000;
 /// A body that rotates by more has no motion of one step [rad].
 constexpr float maxRotation = 1000;
 
@@ -101,7 +104,7 @@ Impact firstTouch(const MovingBody& a, const MovingBody& b, float askedTolerance
         return separation.overlap == Overlap::none ? double(separation.distance) : 0;
     };
     // half of the tolerance is left, so that the bodies come near, and never touch
-    const auto touch = firstNear(approach, tolerance, 0.5 * tolerance, std::numeric_limits<int>::max(), clearanceAt);
+    const auto touch = firstNear(approach, tolerance, 0.5 * tolerance, maxDistances, clearanceAt);
     if (!touch) return {};
     const double fraction = fractionAt(*touch);
     return {true, float(fraction), a.sweep.at(fraction), b.sweep.at(fraction), separation};

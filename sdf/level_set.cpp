@@ -13,6 +13,7 @@
 #include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/base/quoted_text.h"
+#include "sdf/base/voxel_limits.h"
 
 namespace bilayer {
 
@@ -20,8 +21,6 @@ using namespace detail;
 
 namespace {
 
-/// Range of voxel sizes [m]: squared lengths from 1/1000 voxel to thousands of voxels stay within the float range.
-constexpr double minStoredVoxel = 1e-15, maxStoredVoxel = 1e15;
 /// Maximum distance of voxel (0, 0, 0) from the origin [voxels]: floats cannot separate voxels farther away.
 constexpr double maxOrigin = double(std::uint64_t(1) << 40);
 /// Maximum band width [voxels]: a wider band is treated as file damage.

@@ -79,6 +79,8 @@ void writeNanoVdb(const std::filesystem::path& path, const LevelSet& levelSet) {
         stream.exceptions(std::ios::failbit | std::ios::badbit);
         nanovdb::io::writeGrids(stream, grids);
         stream.close();
+    } catch (const std::bad_alloc&) {
+        throw;
     } catch (const std::exception&) {
         throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
     }

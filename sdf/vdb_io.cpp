@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fstream>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -34,6 +35,8 @@ void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& g
         stream.exceptions(std::ios::failbit | std::ios::badbit);
         stream << bytes << checksumLine(bytes);
         stream.close();
+    } catch (const std::bad_alloc&) {
+        throw;
     } catch (const std::exception&) {
         throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
     }

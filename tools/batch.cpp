@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "sdf/base/openvdb.h"
-#include "sdf/base/physical_memory.h"
+#include "sdf/base/usable_memory.h"
 #include "tools/batch/batch_folder.h"
 #include "tools/batch/mesh_list.h"
 #include "tools/batch/report.h"
@@ -88,7 +88,7 @@ int threadCount(const BatchArguments& a) {
 
 std::uint64_t largeBytes(const BatchArguments& a, int threads) {
     if (a.largeMemory > 0) return a.largeMemory << 20;
-    return std::uint64_t(memoryShare * detail::physicalMemory() / threads);
+    return std::uint64_t(memoryShare * detail::usableMemory() / threads);
 }
 
 void printResult(const BatchPlan& plan, const BatchResult& result, double seconds) {

@@ -19,6 +19,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "sdf/base/openvdb.h"
+#include "sdf/leaf/build_options.h"
 #include "tools/commands.h"
 #include "tools/output.h"
 
@@ -120,17 +121,14 @@ openvdb::FloatGrid::Ptr startingLiquid(const SeedArguments& a, const Input& firs
         voxelSize =
             voxelSizeFor(transformed(std::get<Mesh>(first), glm::scale(glm::mat4(1), placement.scale)), a.resolution);
     if (!(voxelSize > 0)) voxelSize = std::get<LevelSet>(first).voxelSize();
-    try {
-        const auto liquid = openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
-        const glm::dvec3 far = originOf(first);
-        if (far != glm::dvec3(0)) {
-            const glm::dvec3 origin = wholeVoxels(placement.toWorld(far), liquid->voxelSize()[0]);
-            liquid->insertMeta(metadata::origin, openvdb::Vec3DMetadata({origin.x, origin.y, origin.z}));
-        }
-        return liquid;
-    } catch (const openvdb::ArithmeticError&) {
-        throw std::runtime_error(fmt::format("a voxel size of {} is too small for OpenVDB", voxelSize));
+    detail::checkVoxelSize(voxelSize);
+    const auto liquid = openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
+    const glm::dvec3 far = originOf(first);
+    if (far != glm::dvec3(0)) {
+        const glm::dvec3 origin = wholeVoxels(placement.toWorld(far), liquid->voxelSize()[0]);
+        liquid->insertMeta(metadata::origin, openvdb::Vec3DMetadata({origin.x, origin.y, origin.z}));
     }
+    return liquid;
 }
 
 // Returns the volume of the negative region, interpolated between voxels; zero if there is none. OpenVDB's

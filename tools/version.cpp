@@ -5,11 +5,13 @@
 #include <assimp/version.h>
 #include <fmt/format.h>
 #include <hwy/highway.h>
+#include <libqhull_r/libqhull_r.h>
 #include <openvdb/version.h>
 #include <tbb/version.h>
 #include <zlib.h>
 
 #include <CLI/CLI.hpp>
+#include <glm/vec3.hpp>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -39,15 +41,18 @@ std::string versions() {
         "oneTBB         {}.{}\n"
         "Assimp         {}.{}.{}\n"
         "Highway        {}.{}.{}\n"
+        "Qhull          {}\n"
+        "GLM            {}.{}.{}.{}\n"
         "Bullet         {}.{}\n"
         "zlib           {}\n"
         "fmt            {}\n"
         "nlohmann json  {}.{}.{}\n"
         "CLI11          {}",
         BILAYER_VERSION, compiler, OPENVDB_LIBRARY_VERSION_STRING, TBB_VERSION_MAJOR, TBB_VERSION_MINOR,
-        aiGetVersionMajor(), aiGetVersionMinor(), aiGetVersionPatch(), HWY_MAJOR, HWY_MINOR, HWY_PATCH,
-        BT_BULLET_VERSION / 100, BT_BULLET_VERSION % 100, zlibVersion(), fmtVersion(), NLOHMANN_JSON_VERSION_MAJOR,
-        NLOHMANN_JSON_VERSION_MINOR, NLOHMANN_JSON_VERSION_PATCH, CLI11_VERSION);
+        aiGetVersionMajor(), aiGetVersionMinor(), aiGetVersionPatch(), HWY_MAJOR, HWY_MINOR, HWY_PATCH, qh_version,
+        GLM_VERSION_MAJOR, GLM_VERSION_MINOR, GLM_VERSION_PATCH, GLM_VERSION_REVISION, BT_BULLET_VERSION / 100,
+        BT_BULLET_VERSION % 100, zlibVersion(), fmtVersion(), NLOHMANN_JSON_VERSION_MAJOR, NLOHMANN_JSON_VERSION_MINOR,
+        NLOHMANN_JSON_VERSION_PATCH, CLI11_VERSION);
 }
 
 }  // namespace bilayer::tools

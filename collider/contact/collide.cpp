@@ -12,6 +12,7 @@
 #include "collider/contact/contact_cache.h"
 #include "collider/contact/finite_contacts.h"
 #include "collider/contact/normal_filter.h"
+#include "collider/contact/placed_shapes.h"
 #include "collider/contact/points_in_field.h"
 #include "collider/contact/sampled_contacts.h"
 #include "collider/contact/surface_query.h"
@@ -149,6 +150,7 @@ const std::string& PointSampler::device() const {
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
                       ContactCache* cache) {
+    for (const Placed* body : {&a, &b}) requireUnitRotation(body->pose);
     const auto visit = [](CandidateLists::List* list) {
         return
             [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };

@@ -13,7 +13,11 @@ struct Order {
     bool isSwapped;  ///< only the first one is
 };
 
-/// Throws std::invalid_argument if neither is a collider, or a scale is not positive.
+/// Throws std::invalid_argument for a rotation that is no unit quaternion. One that is not a number passes: such bodies
+/// have no contacts.
+void requireUnitRotation(const Pose& pose);
+
+/// Throws std::invalid_argument if neither is a collider, a scale is not positive, or a rotation is no unit quaternion.
 Order orderOf(const PlacedShape& a, const PlacedShape& b);
 
 /// For a shape that is a collider.

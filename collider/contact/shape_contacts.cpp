@@ -3,6 +3,8 @@
 // Tested by tests/collider/shapes.cpp through collide().
 #include <bilayer/collider/contact.h>
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -14,6 +16,7 @@
 #include "collider/contact/narrow_phase.h"
 #include "collider/contact/placed_shapes.h"
 #include "collider/contact/shape_data.h"
+#include "sdf/base/unit_tolerance.h"
 
 namespace bilayer {
 
@@ -76,10 +79,19 @@ ContactReport detail::collideShape(const PlacedShape& a, const Placed& b, const 
     return report;
 }
 
+void detail::requireUnitRotation(const Pose& pose) {
+    const float length = glm::length(pose.rotation);
+    if (std::abs(length - 1) > unitTolerance)
+        throw std::invalid_argument(
+            fmt::format("the rotation of a pose must be a unit quaternion, and has the length {:g}", length));
+}
+
 Order detail::orderOf(const PlacedShape& a, const PlacedShape& b) {
-    for (const PlacedShape* body : {&a, &b})
+    for (const PlacedShape* body : {&a, &b}) {
         if (!(body->scale > 0) || !std::isfinite(body->scale))
             throw std::invalid_argument("the scale of a shape must be positive and finite");
+        requireUnitRotation(body->pose);
+    }
     const bool isA = a.shape.collider(), isB = b.shape.collider();
     if (!isA && !isB) throw std::invalid_argument("at least one of the two shapes must be a collider");
     return {isA && isB, isA};

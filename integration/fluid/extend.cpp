@@ -15,7 +15,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/openvdb.h"
-#include "sdf/base/physical_memory.h"
+#include "sdf/base/usable_memory.h"
 
 namespace bilayer::fluid {
 
@@ -35,11 +35,12 @@ void check(const openvdb::FloatGrid& band, const openvdb::CoordBBox& box) {
         throw std::invalid_argument("distances grow from where inside meets outside, and this field has no inside");
     const openvdb::Vec3d size = box.extents().asVec3d();
     const double bytes = size.x() * size.y() * size.z() * bytesPerVoxel;
-    const double memory = physicalMemory();
+    const double memory = usableMemory();
     if (bytes > memory)
         throw std::invalid_argument(
-            fmt::format("to sweep all of the field's box, {} x {} x {} voxels, would need about {:.0f} GiB of memory",
-                        size.x(), size.y(), size.z(), bytes / double(1 << 30)));
+            fmt::format("to sweep all of the field's box, {} x {} x {} voxels, would need about {:.1f} GiB of memory, "
+                        "and {:.1f} GiB may be used",
+                        size.x(), size.y(), size.z(), bytes / double(1 << 30), memory / double(1 << 30)));
 }
 
 /// The field with other distances. The band's guarantees do not hold for swept values.

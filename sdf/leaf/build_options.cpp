@@ -2,6 +2,7 @@
 #include "sdf/leaf/build_options.h"
 
 #include "sdf/base/exact_error.h"
+#include "sdf/base/voxel_limits.h"
 
 #include <fmt/format.h>
 
@@ -33,9 +34,18 @@ void checkWidth(const char* option, float voxels, float voxelSize) {
     require(std::isnormal(width), option, "a width that floats can hold", width);
 }
 
+}  // namespace
+
 void checkVoxelSize(float voxelSize) {
-    if (voxelSize >= minVoxelSize) return;
     double scale = unitStep;
+    if (double(voxelSize) > maxStoredVoxel) {
+        while (double(voxelSize) / scale > maxStoredVoxel) scale *= unitStep;
+        throw std::invalid_argument(
+            fmt::format("voxelSize {:g} is above {:g}, the largest that a field may have: scale the mesh by {:g}, so "
+                        "that voxels are {:g}",
+                        voxelSize, maxStoredVoxel, 1 / scale, double(voxelSize) / scale));
+    }
+    if (voxelSize >= minVoxelSize) return;
     while (scale * double(voxelSize) < double(minVoxelSize)) scale *= unitStep;
     throw std::invalid_argument(
         fmt::format("voxelSize {:g} is below {:g}, the smallest that OpenVDB takes: scale the mesh by {:g}{}, so that "
@@ -43,8 +53,6 @@ void checkVoxelSize(float voxelSize) {
                     voxelSize, minVoxelSize, scale, scale == unitStep ? " (from metres to millimetres)" : "",
                     scale * double(voxelSize)));
 }
-
-}  // namespace
 
 void checkOptions(const BuildOptions& options) {
     // Comparison in the type of the value, so that 1e-4f passes a limit of 1e-4f; false for NaN.

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "sdf/base/physical_memory.h"
+#include "sdf/base/usable_memory.h"
 #include "sdf/leaf/blocks.h"
 
 namespace bilayer::detail {
@@ -85,9 +85,10 @@ void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& o
     const double area = extent.area / (h * h);
     if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
     const double bytes = estimatedBytes(mesh, extent, options, reach);
-    const double memory = physicalMemory();
+    const double memory = usableMemory();
     if (bytes > memory)
-        refuse(fmt::format("with its band it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));
+        refuse(fmt::format("with its band it would need about {:.1f} GiB of memory, and {:.1f} GiB may be used",
+                           bytes / double(1 << 30), memory / double(1 << 30)));
 }
 
 }  // namespace bilayer::detail

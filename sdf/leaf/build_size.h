@@ -30,7 +30,7 @@ double blocksAround(double area, double reach);
 double estimatedBytes(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& options, float reach);
 
 /// Throws std::invalid_argument for a build that cannot succeed: its coordinates would leave 32 bits, or its memory
-/// would exceed the machine's. The parameters are those of estimatedBytes().
+/// would exceed what may be used. The parameters are those of estimatedBytes().
 void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& options, float reach);
 
 }  // namespace bilayer::detail

@@ -200,3 +200,18 @@ TEST_CASE("Nothing is inside of a flat hull, and paths next to it do not enter i
             REQUIRE(test::distance(quad, glm::dvec3(point + entry->fraction * way)) < 1.4e-3);
     }
 }
+
+TEST_CASE("A basis that scales gives the pose of a unit quaternion") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int i = 0; i < 100; ++i) {
+        const btQuaternion rotation(toBullet(random.direction()), float(random(0, 3)));
+        const btMatrix3x3 basis(rotation);
+        const float scale = float(random(0.5, 2));
+        const Pose plain = toPose(btTransform(basis)),
+                   scaled = toPose(btTransform(basis.scaled(btVector3(scale, scale, scale))));
+        CHECK(glm::length(plain.rotation) == Approx(1).epsilon(1e-6));
+        CHECK(glm::length(scaled.rotation) == Approx(1).epsilon(1e-3));
+    }
+}

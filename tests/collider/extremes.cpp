@@ -10,6 +10,7 @@
 
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
+#include <bilayer/collider/distance.h>
 #include <bilayer/collider/field.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
@@ -271,7 +272,8 @@ TEST_CASE("bodies anywhere, of any size, on any way, collide or do not") {
             Placed body{ball()};
             if (i % 2) body.pose.position = extreme.vector();
             if (i % 3 == 0)
-                body.pose.rotation = {extreme.number(), extreme.number(), extreme.number(), extreme.number()};
+                body.pose.rotation =
+                    glm::normalize(glm::quat(extreme.number(), extreme.number(), extreme.number(), extreme.number()));
             if (i % 5 == 0) body.scale = std::abs(extreme.number());
             if (i % 7 == 0) body.motion = {extreme.vector(), extreme.vector()};
             return body;
@@ -281,6 +283,12 @@ TEST_CASE("bodies anywhere, of any size, on any way, collide or do not") {
         ContactCache near;
         ContactOptions options = unfiltered(i % 4 ? voxel : extreme.number(), i % 11 == 0);
         options.reduced = i % 13 < 6;
+        // of numbers too small or too large to normalise
+        const auto hasNoLength = [](const Placed& body) { return glm::length(body.pose.rotation) == 0; };
+        if (hasNoLength(a) || hasNoLength(b)) {
+            CHECK_THROWS_AS(collide(a, b, options, contacts), std::invalid_argument);
+            continue;
+        }
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
         for (const Contact& contact : contacts)
@@ -288,5 +296,59 @@ TEST_CASE("bodies anywhere, of any size, on any way, collide or do not") {
                      std::isfinite(contact.approach)));
         // contacts of the same two balls lie where they overlap
         if (i % 2 == 0 && i % 3 && i % 5 && i % 7 && i % 4) REQUIRE_FALSE(contacts.empty());
+    }
+}
+
+TEST_CASE("a rotation that is no unit quaternion is refused, also with a motion that no body makes") {
+    const Collider samples(sphereMesh(), build(sphereMesh(), {.voxelSize = voxel}),
+                           {.accuracy = ContactAccuracy::samples});
+    const ContactShape box = ContactShape::box({0.2f, 0.2f, 0.2f});
+    std::vector<Contact> contacts;
+    for (const glm::quat& rotation : {glm::quat(0, 0, 0, 0), glm::quat(2, 0, 0, 0), glm::quat(1, 1, 1, 1),
+                                      glm::quat(1e30f, 0, -1e30f, 1), glm::quat(0.99f, 0, 0, 0)}) {
+        const Motion motion{{1e30f, 0, 0}, {0, 900, 0}};
+        const Placed a{samples, {{0.1f, 0, 0}, rotation}, 1, motion}, b{samples};
+        const PlacedShape shape{box, {{0.1f, 0, 0}, rotation}, 1, motion}, other{ContactShape(samples)};
+        const auto isNamed = Catch::Matchers::Contains("must be a unit quaternion");
+        CHECK_THROWS_WITH(collide(a, b, {}, contacts), isNamed);
+        CHECK_THROWS_WITH(collide(b, a, {}, contacts), isNamed);
+        CHECK_THROWS_WITH(collide(shape, other, {}, contacts), isNamed);
+        CHECK_THROWS_WITH(distance(a, b), isNamed);
+        CHECK_THROWS_WITH(distance(other, shape), isNamed);
+        CHECK_THROWS_WITH(timeOfImpact(a, b), isNamed);
+        CHECK_THROWS_WITH(timeOfImpact(shape, other), isNamed);
+    }
+    CHECK(contacts.empty());
+    collide(Placed{samples, {{0.9f, 0, 0}, {1.0003f, 0, 0, 0}}}, Placed{samples}, unfiltered(voxel, false), contacts);
+    CHECK_FALSE(contacts.empty());
+}
+
+TEST_CASE("distances and impacts of bodies anywhere, of any size, on any way, end") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Extremes extreme(seed);
+    const ContactShape shapes[] = {ContactShape(ball()), ContactShape::box({0.2f, 0.3f, 0.4f}),
+                                   ContactShape::cone(0.3f, 0.4f), ContactShape::capsule(0.2f, 0.3f)};
+    for (int i = 0; i < 40; ++i) {
+        CAPTURE(i);
+        const auto placed = [&](const ContactShape& shape) -> PlacedShape {
+            PlacedShape body{shape};
+            body.pose.position = extreme.vector();
+            body.pose.rotation = glm::angleAxis(float(extreme(0, 6)), glm::normalize(glm::vec3(1, 2, 3)));
+            if (i % 3) body.scale = float(std::exp2(extreme(-126, 126)));
+            // a body that rotates by more than a turn takes many steps
+            body.motion = {extreme.vector(), {float(extreme(-6, 6)), float(extreme(-6, 6)), 0}};
+            return body;
+        };
+        const PlacedShape a = placed(shapes[0]), b = placed(shapes[i % 4]);
+        const BodyDistance away = distance(a, b);
+        if (!isFinite(a.pose.position) || !isFinite(b.pose.position)) continue;
+        REQUIRE_FALSE(std::isnan(away.distance));
+        if (!isFinite(a.motion.displacement) || !isFinite(b.motion.displacement)) {
+            CHECK_THROWS_WITH(timeOfImpact(a, b), Catch::Matchers::Contains("must be finite"));
+            continue;
+        }
+        const Impact impact = timeOfImpact(a, b);
+        if (impact.found) REQUIRE((impact.fraction >= 0 && impact.fraction <= 1));
     }
 }

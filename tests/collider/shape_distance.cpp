@@ -349,3 +349,25 @@ TEST_CASE("Two convex sets have the distance of their closest points") {
         if (expected > 0) CHECK(glm::distance(pair.onA, pair.onB) == Approx(expected).margin(1e-8));
     }
 }
+
+TEST_CASE("Convex sets that meet are at distance zero, whatever their size") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int round = 0; round < 2000; ++round) {
+        const double size = std::pow(10, random(-30, 30));
+        const glm::dquat rotation(glm::angleAxis(float(random(0, 3)), random.direction()));
+        const auto supportOf = [&](const glm::dvec3& direction) {
+            const glm::dvec3 own = glm::conjugate(rotation) * direction;
+            return size * (rotation * glm::dvec3(own.x < 0 ? -1 : 1, own.y < 0 ? -1 : 1, own.z < 0 ? -1 : 1));
+        };
+        const glm::dvec3 point(size * 0.5 * glm::dvec3(random.point(1)));
+        // a tolerance that is below the rounding of large sets
+        const detail::ConvexPair pair = detail::convexDistance(
+            [&](const glm::dvec3& d) { return std::pair(supportOf(d), 0); }, [&](const glm::dvec3&) { return point; },
+            1e-9, std::numeric_limits<double>::infinity());
+        CAPTURE(round, size);
+        REQUIRE(pair.simplex.count <= 4);
+        REQUIRE(pair.distance <= 1e-12 * size);
+    }
+}

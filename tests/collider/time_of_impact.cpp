@@ -122,6 +122,19 @@ TEST_CASE("Bodies that overlap touch at the start, and motions that are none are
     CHECK_THROWS_WITH(timeOfImpact(a, b), Catch::Matchers::Contains("1000 rad"));
 }
 
+TEST_CASE("A motion along a gap of hardly more than the tolerance ends, however long it is") {
+    const float radius = 0.5f, angle = 900, tolerance = 1e-3f, gap = 1.02e-3f;
+    const Collider ball = colliderOf(shapes::sphere(radius, 4)), wall = colliderOf(shapes::box({0.5f, 0.5f, 0.5f}));
+    // the axis of the rotation goes through the vertex that is next to the wall
+    const Placed spinning{ball, {{radius + gap, 0, 0}}, 1, {{0, 0, 0}, {angle, 0, 0}}}, still{wall, {{-0.5f, 0, 0}}};
+    const Impact impact = timeOfImpact(spinning, still, {.tolerance = tolerance});
+    REQUIRE(impact.found);
+    CHECK(impact.distance.distance == Approx(gap).epsilon(0.01));
+    // 10,000 steps, each as long as the gap less half of the tolerance, for the corners of the box around the ball
+    CHECK(double(impact.fraction) * angle * radius * std::sqrt(3.0) ==
+          Approx(1e4 * (gap - 0.5 * tolerance)).epsilon(0.02));
+}
+
 TEST_CASE("Bodies in contact rest, slide and part without penetration, and penetrate where they move on") {
     const unsigned seed = test::seed();
     CAPTURE(seed);

@@ -5,7 +5,7 @@ set(scratch ${SCRATCH}/components)
 function(project_of components)
   file(REMOVE_RECURSE ${scratch})
   file(WRITE ${scratch}/CMakeLists.txt "cmake_minimum_required(VERSION 3.22)\nproject(user LANGUAGES CXX)\n"
-    "find_package(bilayer 0.1 REQUIRED COMPONENTS ${components})\n"
+    "find_package(bilayer 1.0 REQUIRED COMPONENTS ${components})\n"
     "foreach(component IN ITEMS sdf collider cl bullet fluid)\n  if(TARGET bilayer::\${component})\n"
     "    message(\"has \${component}\")\n  endif()\nendforeach()\n")
 endfunction()

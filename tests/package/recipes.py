@@ -13,6 +13,14 @@ def faults(root):
     cmake = (root / "CMakeLists.txt").read_text() + (root / "integration" / "python" / "CMakeLists.txt").read_text()
     version = re.search(r"project\(bilayer VERSION ([0-9.]+)", cmake).group(1)
     components = set(re.search(r'BILAYER_COMPONENTS "([^"]+)"', cmake).group(1).split(";"))
+    minor = ".".join(version.split(".")[:2])
+    for path in [root / "README.md", *sorted((root / "docs").rglob("*.md")), *sorted((root / "tests" / "package").rglob("*.*"))]:
+        for asked in re.findall(r"find_package\(bilayer ([0-9.]+)", path.read_text()):
+            if asked != minor:
+                yield f"{path.relative_to(root)} asks for bilayer {asked}, and the version is {version}"
+    newest = re.search(r"^## (\S+)", (root / "CHANGELOG.md").read_text(), re.M).group(1)
+    if newest != version:
+        yield f"CHANGELOG.md begins with {newest}, and the version is {version}"
     port = root / "packaging" / "vcpkg" / "bilayer"
     manifest = json.loads((port / "vcpkg.json").read_text())
     if manifest["version-semver"] != version:

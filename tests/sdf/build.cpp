@@ -239,7 +239,7 @@ TEST_CASE("a mesh smaller than a voxel, and one far from the origin, still have 
     CHECK(e.worst < 0.8);  // coordinates of 1e4 have a precision of only 0.05 voxels
 }
 
-TEST_CASE("voxels too small for OpenVDB are refused with the scale to use") {
+TEST_CASE("voxels too small for OpenVDB, and too large for fields, are refused with the scale to use") {
     // a part of 0.3 mm in metres, and one of a micrometre
     for (const auto& [size, scale] : {std::pair(3e-4f, "scale the mesh by 1000 (from metres to millimetres)"),
                                       std::pair(1e-6f, "scale the mesh by 1e+06,")}) {
@@ -247,6 +247,9 @@ TEST_CASE("voxels too small for OpenVDB are refused with the scale to use") {
         CHECK_THROWS_WITH(build(part, {.voxelSize = voxelSizeFor(part, 128)}),
                           Catch::Contains("2e-05") && Catch::Contains(scale));
     }
+    const Mesh large = shapes::box(glm::vec3(1e30f));
+    CHECK_THROWS_WITH(build(large, {.voxelSize = voxelSizeFor(large, 64)}),
+                      Catch::Contains("above 1e+15") && Catch::Contains("scale the mesh by 1e-15"));
     const Mesh scaled = shapes::box(glm::vec3(3e-4f * 1000));
     CHECK(build(scaled, {.voxelSize = voxelSizeFor(scaled, 128)}).activeVoxels() > 0);
 }
@@ -275,7 +278,8 @@ TEST_CASE("bad options and meshes are refused by name") {
         refused({.voxelSize = bad > 0 ? INFINITY : bad}, "voxelSize");
     }
     // widths that overflow or underflow in the mesh's unit
-    refused({.voxelSize = 1e37f, .exteriorWidthVoxels = 100}, "exteriorWidth");
+    refused({.voxelSize = 1e37f, .exteriorWidthVoxels = 100}, "voxelSize");
+    refused({.voxelSize = 1, .exteriorWidthVoxels = 1e-39f}, "exteriorWidth");
     refused({.voxelSize = 1e-3f, .interiorWidthVoxels = 1e-37f}, "interiorWidth");
     refused({.voxelSize = 1, .threads = 4097}, "threads");
     BuildOptions options{.voxelSize = 0.1f};

@@ -45,6 +45,11 @@ pid_t launch(const Words& arguments, const Surroundings& s, const std::string& i
         const rlimit limit{rlim_t(s.memoryLimit), rlim_t(s.memoryLimit)};
         ::setrlimit(RLIMIT_AS, &limit);
     }
+    if (s.maxSeconds >= 0) {
+        const rlimit limit{rlim_t(s.maxSeconds), rlim_t(s.maxSeconds)};
+        ::setrlimit(RLIMIT_CPU, &limit);
+    }
+    if (!s.folder.empty() && ::chdir(s.folder.c_str()) != 0) ::_exit(126);
     for (const int stream : s.closed) ::close(stream);
     ::execv(words[0], words.data());
     ::_exit(127);

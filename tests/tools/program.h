@@ -28,6 +28,8 @@ struct Surroundings {
     long memoryLimit = -1;                 ///< RLIMIT_AS [bytes]
     std::vector<int> closed{};             ///< standard streams that are closed
     std::string inputPath{};               ///< opened as its standard input, instead of `input`
+    std::string folder{};                  ///< its working directory
+    long maxSeconds = -1;                  ///< RLIMIT_CPU: longer runs end by a signal
 };
 
 using Words = std::vector<std::string>;

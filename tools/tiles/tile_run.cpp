@@ -13,7 +13,7 @@
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
-#include "sdf/base/physical_memory.h"
+#include "sdf/base/usable_memory.h"
 #include "sdf/grid/vdb_grids.h"
 #include "sdf/io/input_file.h"
 #include "sdf/tiles/tile_sort.h"
@@ -58,7 +58,7 @@ class TileRun {
     TileRun(BuildArguments arguments, const TileArguments& tiles, const Ranks& ranks)
         : a_(std::move(arguments)),
           counts_(countsOf(tiles.counts)),
-          budget_(tiles.memoryGiven->count() ? double(tiles.memory) * mib : physicalMemory()),
+          budget_(tiles.memoryGiven->count() ? double(tiles.memory) * mib : usableMemory()),
           ranks_(ranks),
           folder_(a_.output) {}
 

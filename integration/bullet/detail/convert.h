@@ -5,7 +5,10 @@
 
 #include <LinearMath/btTransform.h>
 
+#include <cmath>
+
 #include <bilayer/collider/pose.h>
+#include "sdf/base/unit_tolerance.h"
 
 namespace bilayer::bullet::detail {
 
@@ -23,8 +26,11 @@ inline btQuaternion toBullet(const glm::quat& q) {
     return {q.x, q.y, q.z, q.w};
 }
 
+/// A basis that is no rotation gives that of the nearest unit quaternion.
 inline Pose toPose(const btTransform& t) {
-    return {toGlm(t.getOrigin()), toGlm(t.getRotation())};
+    const glm::quat rotation = toGlm(t.getRotation());
+    const bool isUnit = std::abs(glm::dot(rotation, rotation) - 1) < bilayer::detail::unitTolerance;
+    return {toGlm(t.getOrigin()), isUnit ? rotation : glm::normalize(rotation)};
 }
 
 }  // namespace bilayer::bullet::detail

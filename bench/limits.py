@@ -1,0 +1,127 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""What the command line makes of sizes at its limits: exit status, time, peak memory, last line.
+
+Prints a table in Markdown. The meshes are made by formula, in a temporary folder of about 2 GB."""
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+MILLIONS = 20  # triangles of the largest mesh
+COMPONENTS = 100_000
+NESTED = 2_000  # components in each other
+MAX_SECONDS = 600  # of processor time
+TETRAHEDRON = (np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+
+
+def write_ply(path, points, triangles):
+    faces = np.empty(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, triangles
+    head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\n"
+            f"property float z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
+    path.write_bytes(head.encode() + points.astype("<f4").tobytes() + faces.tobytes())
+    return str(path)
+
+
+def tetrahedra(path, places, sizes):
+    """One tetrahedron of each size at each place."""
+    points, triangles = TETRAHEDRON
+    all_points = places[:, None, :] + sizes[:, None, None] * points
+    all_triangles = triangles + 4 * np.arange(len(places))[:, None, None]
+    return write_ply(path, all_points.reshape(-1, 3), all_triangles.reshape(-1, 3))
+
+
+def meshes(folder):
+    unit, one = np.zeros((1, 3)), np.ones(1)
+    side = int(np.ceil(COMPONENTS ** (1 / 3)))
+    lattice = np.stack(np.unravel_index(np.arange(COMPONENTS), (side, side, side)), axis=1) * 2.0
+    random = np.random.default_rng(1).uniform(0, side, (COMPONENTS, 3))
+    nested = 1 + np.arange(NESTED) / NESTED
+    giant = folder / "giant.ply"
+    subprocess.run([sys.executable, Path(__file__).with_name("giant_mesh.py"), str(MILLIONS), giant], check=True)
+    far = np.array([[0, 0, 0], [1e30, 0, 0], [0, 1, 0], [0, 0, 1]])
+    return {
+        "small": tetrahedra(folder / "small.ply", unit, one),
+        "giant": str(giant),
+        "triangle": write_ply(folder / "triangle.ply", np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])),
+        "large": tetrahedra(folder / "large.ply", unit, 1e30 * one),
+        "tiny": tetrahedra(folder / "tiny.ply", unit, 1e-30 * one),
+        "far": write_ply(folder / "far.ply", far, TETRAHEDRON[1]),
+        "apart": tetrahedra(folder / "apart.ply", lattice, np.ones(COMPONENTS)),
+        "crossing": tetrahedra(folder / "crossing.ply", random, np.ones(COMPONENTS)),
+        "nested": tetrahedra(folder / "nested.ply", -0.2 * nested[:, None] * np.ones(3), nested),
+    }
+
+
+def cases(mesh):
+    build = lambda name, *options: ["build", mesh[name], *options]
+    yield "a tetrahedron, 7.6 * 10^9 voxels in the band", build("small", "--resolution", "23000")
+    yield "the same as a liquid", ["seed", mesh["small"], "--resolution", "23000"]
+    yield "a tetrahedron, resolution 10^6", build("small", "--resolution", "1000000")
+    yield "the same in tiles", build("small", "--resolution", "1000000", "--tiles", "8x8x8", "--sign", "normals")
+    yield "the same as a liquid", ["seed", mesh["small"], "--resolution", "1000000"]
+    yield "a tetrahedron, resolution 10^9", build("small", "--resolution", "1000000000")
+    yield f"{MILLIONS} million triangles", ["inspect", mesh["giant"]]
+    yield "the same", build("giant", "--resolution", "512")
+    yield "the same", build("giant", "--resolution", "512", "--sign", "winding")
+    yield "the same, resolution 10^6", build("giant", "--resolution", "1000000")
+    yield "one triangle, 10^9 voxels in its band", build("triangle", "--voxel-size", "5.5e-5")
+    yield "the same", build("triangle", "--voxel-size", "5.5e-5", "--method", "double-layer")
+    yield "one triangle of 10^9 voxels along an edge", build("large", "--voxel-size", "1e21")
+    yield "half width 1000, resolution 20", build("small", "--resolution", "20", "--half-width", "1000")
+    yield "half width 1000, resolution 1000", build("small", "--resolution", "1000", "--half-width", "1000")
+    yield "half width 1001", build("small", "--resolution", "20", "--half-width", "1001")
+    yield "coordinates of 1e30", build("large", "--resolution", "64")
+    yield "the same", ["inspect", mesh["large"]]
+    yield "one vertex at 1e30", build("far", "--resolution", "64")
+    yield "the same", build("far", "--voxel-size", "0.01")
+    yield "coordinates of 1e-30", build("tiny", "--resolution", "64")
+    yield "the same", ["inspect", mesh["tiny"]]
+    for name in ("apart", "crossing", "nested"):
+        yield f"{NESTED if name == 'nested' else COMPONENTS:,} components, {name}", ["inspect", mesh[name]]
+        yield "the same", build(name, "--resolution", "256")
+        yield "the same", build(name, "--resolution", "256", "--body")
+        yield "the same", build(name, "--resolution", "256", "--union")
+        yield "the same as a liquid", ["seed", mesh[name], "--resolution", "256"]
+
+
+def measure(program, words, folder):
+    if words[0] != "inspect":
+        words = [*words, "-o", str(folder / ("tiles" if "--tiles" in words else "out.vdb"))]
+    begin = time.monotonic()
+    limit = lambda: resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS))
+    process = subprocess.Popen([program, *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, preexec_fn=limit)
+    text = process.stdout.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    seconds = time.monotonic() - begin
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, seconds, usage.ru_maxrss / 1024, text.replace(f"{folder}/", "").strip().split("\n")[-1]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("program", help="bilayer")
+    parser.add_argument("chosen", nargs="*", help="measure only rows that have one of these words")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        mesh = meshes(folder)
+        print("| input | command | status | time [s] | memory [MiB] | last line |\n|---|---|---|---|---|---|")
+        for title, words in cases(mesh):
+            command = " ".join(words).replace(f"{name}/", "")
+            if arguments.chosen and not any(part in title + command for part in arguments.chosen):
+                continue
+            status, seconds, memory, line = measure(arguments.program, words, folder)
+            print(f"| {title} | `{command}` | {status} | {seconds:.1f} | {memory:.0f} | {line} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// The memory that this process may use. Requests that cannot fit into it are rejected early.
+// Tested by tests/tools/limits.cpp through run().
+#pragma once
+
+namespace bilayer::detail {
+
+/// Returns the smallest of the physical memory, the process's limit of address space, and the limits of its control
+/// groups, as containers set them at the first call [bytes].
+double usableMemory();
+
+}  // namespace bilayer::detail
