@@ -32,7 +32,8 @@ bool report(const py::object& progress, float fraction) {
     if (progress.is_none()) return true;
     const py::object answer = progress(fraction);
     if (answer.is_none()) return true;
-    if (!py::isinstance<py::bool_>(answer)) refuseType("progress", "it to return True, False or None", answer);
+    const bool isFlag = py::detail::make_caster<bool>().load(answer, /*convert=*/false);  // of Python or numpy
+    if (!isFlag) refuseType("progress", "it to return True, False or None", answer);
     return answer.cast<bool>();
 }
 

@@ -116,7 +116,8 @@ TEST_CASE("bad input is refused") {
     CHECK_THROWS_WITH(fluid::solid(mesh, {{}, {1, 1, -1}}, *cells), Catch::Matchers::Contains("mirror"));
     CHECK_THROWS_WITH(fluid::solid(mesh, {}, *cells, {.velocity = {glm::vec3(nan)}}),
                       Catch::Matchers::Contains("velocity"));
-    CHECK_THROWS_WITH(fluid::solid(mesh, {}, *cells, {.halfWidthVoxels = 2}), Catch::Matchers::Contains("half width"));
+    CHECK_THROWS_WITH(fluid::solid(mesh, {}, *cells, {.halfWidthVoxels = 2}),
+                      Catch::Matchers::Contains("halfWidthVoxels must be in 3..1000, not 2"));
     const auto turned = Transform::createLinearTransform(0.05);
     turned->preRotate(0.3);
     CHECK_THROWS_WITH(fluid::solid(mesh, {}, *turned), Catch::Matchers::Contains("axes"));

@@ -104,6 +104,9 @@ def test_progress_cancels(sphere):
 
 
 def test_progress_returns_a_bool(sphere):
+    assert bilayer.build(sphere, resolution=300, progress=lambda done: np.bool_(True)).active_voxels > 0
+    with pytest.raises(bilayer.Cancelled):
+        bilayer.build(sphere, resolution=1000, progress=lambda done: np.bool_(False))
     with pytest.raises(ValueError, match="progress: expected it to return True, False or None, got a 'str'"):
         bilayer.build(sphere, resolution=300, progress=lambda done: "on")
 

@@ -1,9 +1,9 @@
-from os import PathLike
-from typing import Any, Callable, Dict, List, Literal, Optional, Protocol, Sequence, Tuple, Union, overload
+from typing import Any, Dict, List, Optional, Sequence, Union, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bilayer._types import Accuracy, MeshLike, Method, Mode, Path, Progress, Sign, Storage
 from bilayer.results import (
     BodyDistance,
     ClosestPoints,
@@ -18,74 +18,15 @@ from bilayer.results import (
     Sparse,
 )
 
-class _VerticesAndFaces(Protocol):
-    """As trimesh."""
-
-    @property
-    def vertices(self) -> Any: ...
-    @property
-    def faces(self) -> Any: ...
-
-class _VerticesAndTriangles(Protocol):
-    """As Open3D's legacy meshes."""
-
-    @property
-    def vertices(self) -> Any: ...
-    @property
-    def triangles(self) -> Any: ...
-
-class _VertexAndTriangle(Protocol):
-    """As Open3D's tensor meshes."""
-
-    @property
-    def vertex(self) -> Any: ...
-    @property
-    def triangle(self) -> Any: ...
-
-class _PointsAndFaces(Protocol):
-    """As PyVista's PolyData."""
-
-    @property
-    def points(self) -> Any: ...
-    @property
-    def faces(self) -> Any: ...
-
-class _PointsAndCells(Protocol):
-    """As meshio."""
-
-    @property
-    def points(self) -> Any: ...
-    @property
-    def cells(self) -> Any: ...
-
-# A Mesh, or what as_mesh() takes.
-MeshLike = Union[
-    Mesh,
-    _VerticesAndFaces,
-    _VerticesAndTriangles,
-    _VertexAndTriangle,
-    _PointsAndFaces,
-    _PointsAndCells,
-    Tuple[ArrayLike, ArrayLike],
-]
-_Path = Union[str, bytes, PathLike[str]]
 # A Pose, a matrix of shape (4, 4), or None.
 _PoseLike = Union[Pose, ArrayLike, None]
-_Progress = Callable[[float], Optional[bool]]
 _Floats = NDArray[np.float32]
 _Doubles = NDArray[np.float64]
 _Bools = NDArray[np.bool_]
-_Method = Literal["exact", "double-layer", "pseudonormal", "prism"]
-_Sign = Literal["auto", "normals", "winding", "flood"]
-_Accuracy = Literal["samples", "exact-near-features", "exact"]
-_Storage = Literal["float32", "fixed16"]
-_Mode = Literal["unite", "intersect", "subtract"]
 
 __version__: str
-
 class Cancelled(RuntimeError): ...
 class DeviceError(RuntimeError): ...
-
 class Mesh:
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, origin: Optional[ArrayLike] = None) -> None: ...
     @property
@@ -98,7 +39,7 @@ class Mesh:
     def bounds(self) -> _Floats: ...
     def welded(self) -> Mesh: ...
     def transformed(self, matrix: ArrayLike) -> Mesh: ...
-    def save(self, path: _Path) -> None: ...
+    def save(self, path: Path) -> None: ...
     def __eq__(self, other: object) -> bool: ...
     def __hash__(self) -> int: ...
     def __copy__(self) -> Mesh: ...
@@ -135,7 +76,7 @@ class LevelSet:
     def sparse(self) -> Sparse: ...
     def surface(self, isovalue: float = 0, adaptivity: float = 0) -> Mesh: ...
     def extended(self, distance: Optional[float] = None) -> LevelSet: ...
-    def save(self, path: _Path, half_float: bool = False) -> None: ...
+    def save(self, path: Path, half_float: bool = False) -> None: ...
     @staticmethod
     def from_numpy(
         values: ArrayLike,
@@ -146,7 +87,7 @@ class LevelSet:
         field_origin: ArrayLike = ...,
     ) -> LevelSet: ...
     @staticmethod
-    def load(path: _Path) -> LevelSet: ...
+    def load(path: Path) -> LevelSet: ...
     def __eq__(self, other: object) -> bool: ...
     def __hash__(self) -> int: ...
     def __copy__(self) -> LevelSet: ...
@@ -157,7 +98,7 @@ class Field:
         self,
         level_set: LevelSet,
         mesh: Optional[MeshLike] = None,
-        storage: _Storage = "float32",
+        storage: Storage = "float32",
         keep_level_set: bool = True,
     ) -> None: ...
     def sample(self, points: ArrayLike) -> Samples: ...
@@ -216,7 +157,7 @@ class Collider:
         *,
         point_spacing_voxels: float = 2,
         margin: Optional[float] = None,
-        accuracy: _Accuracy = "exact-near-features",
+        accuracy: Accuracy = "exact-near-features",
     ) -> None: ...
     @staticmethod
     def from_level_set(level_set: LevelSet) -> Collider: ...
@@ -271,11 +212,11 @@ class Obstacle:
     def origin(self) -> _Doubles: ...
     @property
     def voxel_size(self) -> float: ...
-    def save(self, path: _Path) -> None: ...
+    def save(self, path: Path) -> None: ...
     def __copy__(self) -> Obstacle: ...
     def __deepcopy__(self, memo: Dict[int, Any]) -> Obstacle: ...
 
-def read_mesh(path: _Path) -> Mesh: ...
+def read_mesh(path: Path) -> Mesh: ...
 def inspect(mesh: MeshLike, wall: float = 0) -> MeshReport: ...
 @overload
 def build(
@@ -287,8 +228,8 @@ def build(
     half_width_voxels: Optional[float] = None,
     exterior_width_voxels: Optional[float] = None,
     interior_width_voxels: Optional[float] = None,
-    method: _Method = "exact",
-    sign: _Sign = "auto",
+    method: Method = "exact",
+    sign: Sign = "auto",
     gap_voxels: float = 2,
     unite: bool = False,
     triangles: bool = False,
@@ -298,7 +239,7 @@ def build(
     epsilon: float = 1,
     neighbourhood: int = 2,
     max_subdivision: int = 32,
-    progress: Optional[_Progress] = None,
+    progress: Optional[Progress] = None,
 ) -> LevelSet: ...
 @overload
 def build(
@@ -310,8 +251,8 @@ def build(
     half_width_voxels: Optional[float] = None,
     exterior_width_voxels: Optional[float] = None,
     interior_width_voxels: Optional[float] = None,
-    method: _Method = "exact",
-    sign: _Sign = "auto",
+    method: Method = "exact",
+    sign: Sign = "auto",
     gap_voxels: float = 2,
     unite: bool = False,
     triangles: bool = False,
@@ -321,7 +262,7 @@ def build(
     epsilon: float = 1,
     neighbourhood: int = 2,
     max_subdivision: int = 32,
-    progress: Optional[_Progress] = None,
+    progress: Optional[Progress] = None,
 ) -> LevelSet: ...
 @overload
 def rebuild(
@@ -336,8 +277,8 @@ def rebuild(
     half_width_voxels: Optional[float] = None,
     exterior_width_voxels: Optional[float] = None,
     interior_width_voxels: Optional[float] = None,
-    method: _Method = "exact",
-    sign: _Sign = "auto",
+    method: Method = "exact",
+    sign: Sign = "auto",
     gap_voxels: float = 2,
     unite: bool = False,
     triangles: bool = False,
@@ -346,7 +287,7 @@ def rebuild(
     epsilon: float = 1,
     neighbourhood: int = 2,
     max_subdivision: int = 32,
-    progress: Optional[_Progress] = None,
+    progress: Optional[Progress] = None,
 ) -> LevelSet: ...
 @overload
 def rebuild(
@@ -361,8 +302,8 @@ def rebuild(
     half_width_voxels: Optional[float] = None,
     exterior_width_voxels: Optional[float] = None,
     interior_width_voxels: Optional[float] = None,
-    method: _Method = "exact",
-    sign: _Sign = "auto",
+    method: Method = "exact",
+    sign: Sign = "auto",
     gap_voxels: float = 2,
     unite: bool = False,
     triangles: bool = False,
@@ -371,7 +312,7 @@ def rebuild(
     epsilon: float = 1,
     neighbourhood: int = 2,
     max_subdivision: int = 32,
-    progress: Optional[_Progress] = None,
+    progress: Optional[Progress] = None,
 ) -> LevelSet: ...
 def devices() -> List[Dict[str, Any]]: ...
 def mass_properties(solid: Union[LevelSet, MeshLike]) -> MassProperties: ...
@@ -381,7 +322,7 @@ def with_body(
     *,
     point_spacing_voxels: float = 2,
     margin: Optional[float] = None,
-    accuracy: _Accuracy = "exact-near-features",
+    accuracy: Accuracy = "exact-near-features",
     keep_mesh: bool = True,
 ) -> LevelSet: ...
 def collide(
@@ -436,7 +377,7 @@ def seed(
     body: Union[LevelSet, MeshLike],
     pose: _PoseLike = None,
     scale: ArrayLike = 1,
-    mode: _Mode = "unite",
+    mode: Mode = "unite",
     unite_solids: bool = True,
 ) -> Seeded: ...
 def particles(

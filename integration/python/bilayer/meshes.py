@@ -11,7 +11,7 @@ import numpy as np
 from bilayer._bilayer import Mesh
 
 if TYPE_CHECKING:
-    from bilayer._bilayer import MeshLike
+    from bilayer._types import MeshLike
 
 _ACCEPTED = (
     "a bilayer.Mesh, an object with .vertices and .faces (trimesh) or .triangles (Open3D), an Open3D tensor mesh, "
