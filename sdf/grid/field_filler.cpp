@@ -170,11 +170,12 @@ void FieldFiller::fillWithSidesOfLast(const Mesh& mesh, const std::string& reaso
 }
 
 // With equal widths on both sides, the active voxels do not depend on the signs. The sides of a closed mesh follow from
-// its triangles alone.
+// its triangles alone. A device that keeps the field leaves no block here.
 bool FieldFiller::signAgainByWinding(const Mesh& mesh, const std::string& reason) {
     Stopwatch part;
     const BandWidths widths = bandOf(options_);
-    const bool isComplete = enclosesSurface(options_) && widths.exterior == widths.interior && !part_;
+    const bool isComplete =
+        filledBlocks_ > 0 && enclosesSurface(options_) && widths.exterior == widths.interior && !part_;
     if (!isComplete || options_.unite || !balanced(mesh, &progress_)) return false;
     openvdb::tree::LeafManager<openvdb::FloatTree> leaves(distance_->tree());
     leaves.foreach ([](auto& leaf, std::size_t) {

@@ -52,7 +52,8 @@ class FieldFiller {
     void fillWithSidesOfLast(const Mesh& mesh, const std::string& reason);
 
     /// Replaces the signs of the last field, filled by normals and by the requested method, with those of winding
-    /// numbers. Returns false and does nothing if another fill would find distances that the last one left out.
+    /// numbers. Returns false and does nothing if another fill would find distances that the last one left out, or if a
+    /// device keeps the field.
     bool signAgainByWinding(const Mesh& mesh, const std::string& reason);
 
     /// Returns the last field as a level set.
