@@ -41,12 +41,14 @@ inline openvdb::FloatGrid::Ptr unsignedBand(const Mesh& mesh, float voxelSize, f
 inline std::string fault(const openvdb::FloatGrid& field, const openvdb::FloatGrid& distances,
                          const detail::BandWidths& widths) {
     const float exterior = widths.exterior * widths.voxelSize, interior = widths.interior * widths.voxelSize;
+    const float edge = detail::bandEdge * widths.voxelSize;
     if (field.background() != exterior) return "background";
     const auto values = field.getConstAccessor();
     for (auto d = distances.cbeginValueOn(); d; ++d) {
         const float value = values.getValue(d.getCoord()), width = value < 0 ? interior : exterior;
-        if (values.isValueOn(d.getCoord()) != (*d < width)) return "band";
-        if (std::abs(value) != std::min(*d, width)) return "distance";
+        const bool isInBand = *d < width - edge;
+        if (values.isValueOn(d.getCoord()) != isInBand) return "band";
+        if (std::abs(value) != (isInBand ? *d : width)) return "distance";
     }
     const auto known = distances.getConstAccessor();
     for (auto value = field.cbeginValueAll(); value; ++value) {

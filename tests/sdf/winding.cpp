@@ -98,7 +98,10 @@ std::size_t wrongSigns(const openvdb::FloatGrid& field, const Mesh& mesh, const 
 // In leaves each voxel has its own sign; elsewhere all voxels of a leaf-sized block of an open mesh have the sign of
 // its centre.
 std::size_t wrongSigns(const Field& f, const Mesh& mesh, bool closed, std::size_t count, unsigned seed) {
-    return wrongSigns(*f.field, mesh, voxelsOf(*f.distances, count, seed), [&](const openvdb::Coord& voxel) {
+    std::vector<openvdb::Coord> voxels = voxelsOf(*f.distances, count, seed);
+    // on the surface itself, both sides are right
+    std::erase_if(voxels, [&](const openvdb::Coord& voxel) { return f.distances->tree().getValue(voxel) == 0; });
+    return wrongSigns(*f.field, mesh, voxels, [&](const openvdb::Coord& voxel) {
         if (closed || f.distances->tree().probeConstLeaf(voxel)) return voxel.asVec3d();
         return openvdb::Vec3d(voxel.x() & ~7, voxel.y() & ~7, voxel.z() & ~7) + 3.5;
     });
