@@ -2,12 +2,19 @@
 #include "integration/python/cancellable.h"
 
 #include <tbb/parallel_for.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <exception>
 #include <future>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include <bilayer/sdf/options.h>
 
@@ -22,6 +29,70 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds pollInterval(20);
 /// Parts of a batch that are answered before the first look for signals.
 constexpr std::size_t firstParts = 16;
+
+/// A thread that runs one job after another.
+class Worker {
+  public:
+    Worker() : thread_([this] { run(); }) { thread_.detach(); }
+
+    std::future<void> start(std::function<void()> job) {
+        std::packaged_task<void()> task(std::move(job));
+        std::future<void> done = task.get_future();
+        {
+            const std::lock_guard lock(mutex_);
+            task_ = std::move(task);
+        }
+        wake_.notify_one();
+        return done;
+    }
+
+  private:
+    [[noreturn]] void run() {
+        std::unique_lock lock(mutex_);
+        for (;;) {
+            wake_.wait(lock, [&] { return task_.valid(); });
+            std::packaged_task<void()> task = std::exchange(task_, {});
+            lock.unlock();
+            task();
+            lock.lock();
+        }
+    }
+
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    std::packaged_task<void()> task_;
+    std::thread thread_;  // starts last
+};
+
+/// Workers that wait for jobs. They are kept, since TBB 2021.8 keeps 8 KB of each thread that has used it.
+class Workers {
+  public:
+    /// Lives as long as the process, as its workers do.
+    static Workers& all() {
+        static Workers* const workers = new Workers;
+        return *workers;
+    }
+
+    std::unique_ptr<Worker> take() {
+        const std::lock_guard lock(mutex_);
+        // threads are not in the copy of a process that fork() makes
+        if (std::exchange(process_, ::getpid()) != ::getpid())
+            for (auto& worker : std::exchange(idle_, {})) static_cast<void>(worker.release());
+        if (idle_.empty()) return std::make_unique<Worker>();
+        std::unique_ptr<Worker> worker = std::move(idle_.back());
+        idle_.pop_back();
+        return worker;
+    }
+    void giveBack(std::unique_ptr<Worker> worker) {
+        const std::lock_guard lock(mutex_);
+        idle_.push_back(std::move(worker));
+    }
+
+  private:
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<Worker>> idle_;
+    pid_t process_ = ::getpid();
+};
 
 void throwIfSignalled() {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -47,7 +118,8 @@ void runCancellable(const py::object& progress, const std::function<void(const L
         fraction = done;
         return !cancelled;
     };
-    auto running = std::async(std::launch::async, [&] { job(listener); });
+    std::unique_ptr<Worker> worker = Workers::all().take();
+    std::future<void> running = worker->start([&] { job(listener); });
     const auto finished = [&] {
         const py::gil_scoped_release release;
         return running.wait_for(pollInterval) == std::future_status::ready;
@@ -67,6 +139,7 @@ void runCancellable(const py::object& progress, const std::function<void(const L
     } catch (...) {
         if (!raised) raised = std::current_exception();
     }
+    Workers::all().giveBack(std::move(worker));
     if (!raised && cancelled) raised = std::make_exception_ptr(Cancelled());  // requested in the last moment
     if (raised) std::rethrow_exception(raised);
     report(progress, 1);

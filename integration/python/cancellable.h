@@ -16,7 +16,7 @@ namespace py = pybind11;
 /// As BuildOptions::progress.
 using Listener = std::function<bool(float)>;
 
-/// Runs a job on a thread of its own and without the GIL. The calling thread, to which signals belong, looks for Ctrl-C
+/// Runs a job on another thread and without the GIL. The calling thread, to which signals belong, looks for Ctrl-C
 /// and calls `progress` with the completed fraction. Call this with the GIL held.
 /// @param progress  a callable, which cancels by returning False, or None
 /// Throws what the job throws, what `progress` or a signal handler raises, and Cancelled; always after the job's end.
