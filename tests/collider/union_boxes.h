@@ -65,8 +65,9 @@ inline double sharpEdgeLength(const Mesh& mesh) {
     double length = 0;
     for (const auto& [edge, around] : normals) {
         const auto& [a, b] = edge;
-        const bool isSharp = std::any_of(around.begin(), around.end(),
-                                         [&](const glm::vec3& normal) { return glm::dot(normal, around[0]) < 0.5f; });
+        const bool isSharp = std::any_of(around.begin(), around.end(), [first = around[0]](const glm::vec3& normal) {
+            return glm::dot(normal, first) < 0.5f;
+        });
         if (isSharp) length += std::hypot(double(a[0] - b[0]), double(a[1] - b[1]), double(a[2] - b[2]));
     }
     return length;
