@@ -3,9 +3,12 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/info.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <cstddef>
+#include <map>
+#include <optional>
 #include <stdexcept>
 
 #include <bilayer/sdf/grids.h>
@@ -41,11 +44,22 @@ void refuseForDevices(const BuildOptions& options, const DeviceFiller& device) {
             fmt::format("the {} back end has no method {}", device.backend, nameOf(options.method)));
 }
 
+// Returns the calling thread's arena of this many threads. Arenas are kept: each new one costs some kilobytes that TBB
+// 2021.8 does not give back.
+tbb::task_arena& arenaOf(int threads) {
+    thread_local std::map<int, tbb::task_arena> arenas;
+    return arenas.try_emplace(threads, threads).first->second;
+}
+
+// TBB starts no more threads than there are cores unless it is asked to. A lower limit would hold for the whole
+// process.
 template <class Work>
 auto withThreads(int threads, const Work& work) {
     if (threads == 0) return work();
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
-    return tbb::task_arena(threads).execute(work);
+    std::optional<tbb::global_control> moreThanCores;
+    if (threads > tbb::info::default_concurrency())
+        moreThanCores.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+    return arenaOf(threads).execute(work);
 }
 
 }  // namespace
