@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/bvh/winding_in_ball.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
+
+#include "sdf/bvh/solid_angle.h"
 
 namespace bilayer::detail {
 namespace {
@@ -15,6 +18,8 @@ namespace {
 constexpr double farRatio = 0.25;
 /// A cluster is expanded for each point if its radius is at most this share of its distance from the ball.
 constexpr double clusterRatio = 0.35;
+/// Maximum error of a triangle as a dipole.
+constexpr double dipoleError = 3e-4;
 
 // Returns m u.
 glm::dvec3 times(const Symmetric2& m, const glm::dvec3& u) {
@@ -38,9 +43,24 @@ WindingInBall::WindingInBall(const WindingNumber& winding, const glm::dvec3& cen
         else if (node.radius < clusterRatio * (distance - radius))
             clusters_.push_back(&node);
         else if (node.right == 0)
-            leaves_.push_back(&node);
+            addTriangles(node);
         else
             open.insert(open.end(), {node.right, at + 1});
+    }
+}
+
+// The kernel of WindingNumber about a triangle's centre: its term of first order integrates to 0, and those of order
+// k - 1 > 1 are at most k t^(k - 1) / R^2 with t = radius / R < 1/4, in sum less than 5 t^2 / R^2.
+void WindingInBall::addTriangles(const Node& leaf) {
+    for (std::uint32_t i = leaf.begin; i < leaf.end; ++i) {
+        const Corners& t = winding_.triangles_[i];
+        const glm::dvec3 a(t[0]), b(t[1]), c(t[2]), centre = (a + b + c) / 3.0;
+        const glm::dvec3 normal = glm::cross(b - a, c - a) / (8 * glm::pi<double>());
+        const double area = glm::length(normal);
+        const double squared = std::max(
+            {glm::dot(a - centre, a - centre), glm::dot(b - centre, b - centre), glm::dot(c - centre, c - centre)});
+        const double error = 5 * squared * area, reach = std::max(16 * squared, std::sqrt(error / dipoleError));
+        triangles_.push_back({centre, normal, area, squared, reach, error, &t});
     }
 }
 
@@ -63,15 +83,46 @@ void WindingInBall::addFar(const Node& node, const glm::dvec3& toCentre, double 
     for (std::size_t axis = 0; axis < 3; ++axis) curvature_[axis] -= 1.5 * au * scale;
 }
 
-WindingNumber::Estimate WindingInBall::estimate(const glm::dvec3& point) const {
+WindingNumber::Estimate WindingInBall::farEstimate(const glm::dvec3& point) const {
     const glm::dvec3 d = point - centre_;
-    WindingNumber::Estimate sum{far_.value + glm::dot(d, slope_ + times(curvature_, d)), far_.error};
+    return {far_.value + glm::dot(d, slope_ + times(curvature_, d)), far_.error};
+}
+
+// A surface of area A that is nowhere closer than d fills at most A / (4 pi d^2) of all directions. From two radii
+// away and more, as from all clusters, d is at least half the distance from the centre.
+WindingNumber::Estimate WindingInBall::coarseEstimate(const glm::dvec3& point) const {
+    const auto squaredTo = [&](const glm::dvec3& centre) { return glm::dot(centre - point, centre - point); };
+    WindingNumber::Estimate sum = farEstimate(point);
+    for (const Node* cluster : clusters_)
+        sum.error += cluster->total / (glm::pi<double>() * squaredTo(cluster->centre));
+    for (const NearTriangle& triangle : triangles_) {
+        const double squared = squaredTo(triangle.centre);
+        sum.error += squared > 4 * triangle.squaredRadius ? 4 * triangle.area / squared : 0.5;
+    }
+    return sum;
+}
+
+WindingNumber::Estimate WindingInBall::estimate(const glm::dvec3& point) const {
+    WindingNumber::Estimate sum = farEstimate(point);
     for (const Node* cluster : clusters_) {
         const WindingNumber::Estimate part = winding_.expansion(*cluster, point);
         sum.value += part.value;
         sum.error += part.error;
     }
-    for (const Node* leaf : leaves_) sum.value += winding_.solidAngles(*leaf, point);
+    for (const NearTriangle& triangle : triangles_) {
+        const glm::dvec3 toCentre = triangle.centre - point;
+        const double squared = glm::dot(toCentre, toCentre);
+        if (squared > triangle.squaredReach) {
+            sum.value += glm::dot(triangle.normal, toCentre) / (squared * std::sqrt(squared));
+            sum.error += triangle.error / (squared * squared);
+            continue;
+        }
+        const Corners& t = *triangle.corners;
+        const SolidAngle angle =
+            solidAngle(glm::dvec3(t[0]) - point, glm::dvec3(t[1]) - point, glm::dvec3(t[2]) - point);
+        sum.value += angle.value / (4 * glm::pi<double>());
+        sum.error += angle.jumps ? 1 : 0;
+    }
     return sum;
 }
 

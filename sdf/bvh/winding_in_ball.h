@@ -20,13 +20,34 @@ class WindingInBall {
     /// @param radius   [m]
     WindingInBall(const WindingNumber& winding, const glm::dvec3& centre, double radius);
 
-    /// Computes the winding number at a point of the ball [m], with a bound of its error.
+    /// Returns whether any cluster or triangle is summed for each point.
+    bool hasNear() const { return !clusters_.empty() || !triangles_.empty(); }
+
+    /// Computes the winding number at a point of the ball [m], with a bound of its error: at least 1 if the point lies
+    /// on a triangle, up to rounding, where the number jumps.
     WindingNumber::Estimate estimate(const glm::dvec3& point) const;
+
+    /// As estimate(), in a tenth of the time: all that is near the ball adds to the error only, by its area and
+    /// distance.
+    WindingNumber::Estimate coarseEstimate(const glm::dvec3& point) const;
 
   private:
     using Node = WindingNumber::Node;
+    using Corners = WindingNumber::Corners;
+
+    struct NearTriangle {
+        glm::dvec3 centre;
+        glm::dvec3 normal;     // its length is `area`
+        double area;           // over 4 pi
+        double squaredRadius;  // of a ball around the centre
+        double squaredReach;   // farther from the centre than its root, the triangle counts as a dipole
+        double error;          // of the dipole, times the fourth power of the distance
+        const Corners* corners;
+    };
 
     void addFar(const Node& node, const glm::dvec3& toCentre, double radius);
+    void addTriangles(const Node& leaf);
+    WindingNumber::Estimate farEstimate(const glm::dvec3& point) const;
 
     const WindingNumber& winding_;
     glm::dvec3 centre_;
@@ -34,7 +55,9 @@ class WindingInBall {
     WindingNumber::Estimate far_{0, 0};
     glm::dvec3 slope_{0};
     Symmetric2 curvature_{};
-    std::vector<const Node*> clusters_, leaves_;  // near the ball
+    // near the ball
+    std::vector<const Node*> clusters_;
+    std::vector<NearTriangle> triangles_;
 };
 
 }  // namespace bilayer::detail

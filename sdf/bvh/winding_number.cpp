@@ -14,6 +14,7 @@
 
 #include "sdf/base/progress.h"
 #include "sdf/bvh/median_tree.h"
+#include "sdf/bvh/solid_angle.h"
 
 namespace bilayer::detail {
 namespace {
@@ -26,12 +27,6 @@ constexpr double surelyNearest = 0.49;
 
 double determinant(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     return glm::dot(a, glm::cross(b, c));
-}
-
-double solidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
-    const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
-    const double below = la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
-    return 2 * std::atan2(determinant(a, b, c), below);
 }
 
 // Touching counts as an intersection. The determinants of a shared edge are exact negatives of each other, so no
@@ -162,7 +157,7 @@ double WindingNumber::solidAngles(const Node& node, const glm::dvec3& point) con
     double angle = 0;
     for (std::uint32_t i = node.begin; i < node.end; ++i) {
         const Corners& t = triangles_[i];
-        angle += solidAngle(glm::dvec3(t[0]) - point, glm::dvec3(t[1]) - point, glm::dvec3(t[2]) - point);
+        angle += solidAngle(glm::dvec3(t[0]) - point, glm::dvec3(t[1]) - point, glm::dvec3(t[2]) - point).value;
     }
     return angle / (4 * glm::pi<double>());
 }

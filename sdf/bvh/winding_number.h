@@ -34,9 +34,8 @@ class WindingNumber {
     };
 
     /// Computes the winding number at a point [m]. Refines until the error is below `share` (0..1) times the difference
-    /// of the value from 1/2. If necessary it descends to single triangles (A. Van Oosterom, J. Strackee, "The solid
-    /// angle of a plane triangle", IEEE TBME 30 (1983)). The result is therefore on the correct side of 1/2, unless the
-    /// true number equals 1/2 up to rounding.
+    /// of the value from 1/2. If necessary it descends to single triangles. The result is therefore on the correct side
+    /// of 1/2, unless the true number equals 1/2 up to rounding.
     Estimate estimate(const glm::dvec3& point, double share) const;
     double operator()(const glm::dvec3& point) const { return estimate(point, 0.5).value; }
 

@@ -16,7 +16,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr int side = blockSide, columns = columnsPerLeaf;
+constexpr int side = blockSide, columns = int(columnsPerLeaf);
 
 /// The integers in an interval.
 struct Interval {

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,7 +22,7 @@ namespace bilayer::detail {
 
 class Progress;
 
-inline constexpr int columnsPerLeaf = blockSide * blockSide;
+inline constexpr std::size_t columnsPerLeaf = blockSide * blockSide;
 
 /// A crossing of a column and a triangle.
 struct ColumnCrossing {
@@ -106,42 +105,32 @@ class ColumnCrossings {
 /// The winding numbers along the columns of a tile, from bottom to top.
 class ColumnNumbers {
   public:
-    /// Advances to the next leaf of the tile. Returns its voxels with a winding number above 0.
-    BlockMask advance(const BandLeaf& leaf, std::span<const ColumnCrossing> crossings) {
+    /// Enters the next leaf of the tile. Returns the columns that are crossed in it or below it, one bit each.
+    std::uint64_t enter(const BandLeaf& leaf, std::span<const ColumnCrossing> crossings) {
         std::uint64_t crossed = 0;
         for (const ColumnCrossing& crossing : crossings) {
             const std::int32_t k = std::max(crossing.above - leaf.origin().z(), 0);
             changes_[std::size_t(crossing.column * blockSide + k)] += crossing.sign;
             crossed |= std::uint64_t(1) << crossing.column;
         }
-        for (std::uint64_t rest = crossed; rest != 0; rest &= rest - 1) advanceColumn(std::countr_zero(rest));
-        BlockMask inside;
-        for (std::size_t x = 0; x < blockSide; ++x) {
-            inside[x] = 0;
-            for (std::size_t y = 0; y < blockSide; ++y)
-                inside[x] |= std::uint64_t(inside_[x * blockSide + y]) << (blockSide * y);
-        }
-        for (std::uint64_t rest = crossed; rest != 0; rest &= rest - 1) {
-            std::uint8_t& column = inside_[std::size_t(std::countr_zero(rest))];
-            column = column >> (blockSide - 1) ? 0xff : 0;
-        }
-        return inside;
+        return crossed;
+    }
+
+    /// Returns a column's number below the leaf; in all of it, if the column is not crossed.
+    std::int32_t below(std::size_t column) const { return winding_[column]; }
+
+    /// Advances a column to the leaf's top, and calls visit(k, number) for each of its voxels. To be called once for
+    /// each column that is crossed.
+    template <class Visit>
+    void climb(std::size_t column, const Visit& visit) {
+        std::int32_t& winding = winding_[column];
+        for (std::size_t k = 0; k < blockSide; ++k)
+            visit(int(k), winding += std::exchange(changes_[column * blockSide + k], 0));
     }
 
   private:
-    void advanceColumn(int column) {
-        std::uint8_t bits = 0;
-        std::int32_t& winding = winding_[std::size_t(column)];
-        for (int k = 0; k < blockSide; ++k) {
-            winding += std::exchange(changes_[std::size_t(column * blockSide + k)], 0);
-            bits = std::uint8_t(bits | (winding > 0) << k);
-        }
-        inside_[std::size_t(column)] = bits;
-    }
-
     std::array<std::int32_t, columnsPerLeaf> winding_{};
     std::array<std::int32_t, columnsPerLeaf * blockSide> changes_{};  ///< at the voxels of one leaf
-    std::array<std::uint8_t, columnsPerLeaf> inside_{};               ///< one bit for each voxel of a leaf's column
 };
 
 }  // namespace bilayer::detail

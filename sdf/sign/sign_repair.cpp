@@ -4,13 +4,10 @@
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_reduce.h>
 
-#include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <span>
-#include <utility>
 
 #include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
@@ -20,7 +17,7 @@ namespace bilayer::detail {
 namespace {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
-constexpr int side = int(Leaf::DIM), columns = side * side;
+constexpr int side = int(Leaf::DIM);
 
 /// Voxels closer to the surface than this may have either sign [voxels].
 constexpr float onSurface = 1e-3f;
@@ -28,28 +25,27 @@ constexpr float onSurface = 1e-3f;
 /// Up to this many leaves, all columns are compared at once, in milliseconds.
 constexpr openvdb::Index32 fewLeaves = 1024;
 
-/// The winding numbers along the columns of a tile, from bottom to top.
-class Rise {
+/// Compares the signs of a tile's leaves with the winding numbers along its columns, from bottom to top.
+class TileRepair {
   public:
-    Rise(float tolerance, float limit) : tolerance_(tolerance), limit_(limit) {}
+    TileRepair(float tolerance, float limit) : tolerance_(tolerance), limit_(limit) {}
 
-    /// Compares a leaf, corrects it, and advances to its top.
+    /// Compares the next leaf, and corrects it.
     /// @param crossings  those between the last leaf's top and this one's
     /// @param asked      the columns to compare
     void repair(Leaf& leaf, std::span<const ColumnCrossing> crossings, std::uint64_t asked, SignRepair& sum) {
-        for (const ColumnCrossing& crossing : crossings) {
-            const std::int32_t k = std::max(crossing.above - leaf.origin().z(), 0);
-            changes_[std::size_t(crossing.column * side + k)] += crossing.sign;
-            crossed_ |= std::uint64_t(1) << crossing.column;
-        }
-        const float* values = leaf.buffer().data();
+        const std::uint64_t crossed = numbers_.enter(leaf, crossings);
         for (std::uint64_t rest = asked; rest != 0; rest &= rest - 1) {
-            const int column = std::countr_zero(rest);
-            const bool crossed = crossed_ >> column & 1;
-            const bool isInside = inside_ >> column & 1;
-            if (crossed || !allAre(isInside, values + column * side)) repairColumn(leaf, column, crossed, sum);
+            const auto column = std::size_t(std::countr_zero(rest));
+            const std::int32_t below = numbers_.below(column);
+            const auto repairOne = [&](int k, std::int32_t winding) {
+                repairVoxel(leaf, unsigned(column) * side + unsigned(k), winding, sum);
+            };
+            if (crossed >> column & 1)
+                numbers_.climb(column, repairOne);
+            else if (!allAre(below > 0, leaf.buffer().data() + column * side))
+                for (int k = 0; k < side; ++k) repairOne(k, below);
         }
-        crossed_ = 0;
     }
 
   private:
@@ -59,26 +55,17 @@ class Rise {
         return differ >> 31 == 0;
     }
 
-    void repairColumn(Leaf& leaf, int column, bool crossed, SignRepair& sum) {
-        std::int32_t& winding = winding_[std::size_t(column)];
-        for (int k = 0; k < side; ++k) {
-            const int voxel = column * side + k;
-            if (crossed) winding += std::exchange(changes_[std::size_t(voxel)], 0);
-            float& value = leaf.buffer().data()[voxel];
-            if (std::signbit(value) == (winding > 0) || std::abs(value) <= tolerance_) continue;
-            if (!leaf.isValueOn(openvdb::Index(voxel))) continue;
-            const bool mayFlip = winding >= 0 && std::abs(value) < limit_;
-            if (mayFlip) value = -value;
-            ++(mayFlip ? sum.repaired : sum.refused);
-        }
-        const std::uint64_t bit = std::uint64_t(1) << column;
-        inside_ = winding > 0 ? inside_ | bit : inside_ & ~bit;
+    void repairVoxel(Leaf& leaf, unsigned voxel, std::int32_t winding, SignRepair& sum) const {
+        float& value = leaf.buffer().data()[voxel];
+        if (std::signbit(value) == (winding > 0) || std::abs(value) <= tolerance_) return;
+        if (!leaf.isValueOn(openvdb::Index(voxel))) return;
+        const bool mayFlip = winding >= 0 && std::abs(value) < limit_;
+        if (mayFlip) value = -value;
+        ++(mayFlip ? sum.repaired : sum.refused);
     }
 
-    float tolerance_, limit_;
-    std::array<std::int32_t, columns> winding_{};
-    std::array<std::int32_t, columns * side> changes_{};  ///< changes of the winding number at the voxels of one leaf
-    std::uint64_t inside_ = 0, crossed_ = 0;              ///< one bit per column
+    const float tolerance_, limit_;
+    ColumnNumbers numbers_;
 };
 
 /// @param fifths  whether to compare only one column in five
@@ -91,9 +78,9 @@ SignRepair repairColumns(openvdb::FloatGrid& distance, const Mesh& mesh, float l
             ColumnCrossings::OfTile crossings;
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 poll(progress);
-                Rise rise(onSurface * float(voxelSize), limit);
+                TileRepair tile(onSurface * float(voxelSize), limit);
                 columns.forEachLeaf(i, crossings, [&](Leaf& leaf, auto found, std::uint64_t asked) {
-                    rise.repair(leaf, found, asked, sum);
+                    tile.repair(leaf, found, asked, sum);
                 });
             }
             return sum;

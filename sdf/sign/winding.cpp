@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/sign/winding.h"
 
-#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -14,7 +13,6 @@
 #include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/leaf/build_size.h"
-#include "sdf/sign/column_crossings.h"
 #include "sdf/sign/octree_cells.h"
 #include "sdf/sign/winding_cells.h"
 #include "sdf/sign/winding_leaves.h"
@@ -37,22 +35,6 @@ openvdb::CoordBBox spaceOf(const std::vector<BandLeaf*>& leaves, const WindingQu
     return box;
 }
 
-// The winding number of a closed mesh is the sum of the crossings of a column below.
-void signByColumns(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, const BandWidths& widths,
-                   Progress* progress) {
-    const ColumnCrossings columns(leaves, mesh, double(widths.voxelSize), false, progress);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns.tiles()), [&](const auto& range) {
-        ColumnCrossings::OfTile crossings;
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            poll(progress);
-            ColumnNumbers numbers;
-            columns.forEachLeaf(i, crossings, [&](BandLeaf& leaf, auto found, std::uint64_t) {
-                signLeaf(leaf, numbers.advance(leaf, found), widths);
-            });
-        }
-    });
-}
-
 }  // namespace
 
 void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths& widths, bool closed,
@@ -70,10 +52,9 @@ void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths&
             poll(progress);
             const WindingBrick brick(cells.all().subspan(bricks[b], bricks[b + 1] - bricks[b]));
             signEmptyCells(query, brick, found.local());
-            if (!closed) signLeaves(query, brick, widths);
         });
     }
-    if (closed) signByColumns(leaves, mesh, widths, progress);
+    signLeaves(leaves, mesh, winding, widths, closed, progress);
     std::vector<openvdb::CoordBBox> inside;
     for (const auto& boxes : found) inside.insert(inside.end(), boxes.begin(), boxes.end());
     assemble(grid, inside, widths, progress);

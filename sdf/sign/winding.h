@@ -17,10 +17,11 @@ namespace bilayer::detail {
 ///
 /// The bytes do not depend on the thread count. Throws std::invalid_argument as validate() does, and Cancelled. After
 /// an exception the grid is incomplete.
-/// @param closed  true: every edge is used equally often in both directions. The number is then constant where no
-///                surface lies between, and few voxels need a query. false: the number changes across a hole, away from
-///                any surface. Voxels of leaves then get the sign at their own centre. The space between leaves gets
-///                one sign for each 8x8x8 block, from the block's centre.
+///
+/// Voxels of leaves get the sign at their own centre. The space between leaves gets one sign for each 8x8x8 block, from
+/// the block's centre.
+/// @param closed  true: every edge is used equally often in both directions, and the number changes only across the
+///                surface. false: it also changes across holes, away from any surface.
 /// @param progress  polled for cancellation, unless null
 void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths& widths, bool closed,
                    Progress* progress = nullptr);

@@ -5,9 +5,9 @@ namespace bilayer::detail {
 
 WindingBrick::WindingBrick(std::span<const OctreeCell> cells) : cells_(cells), origin_(cells.front().origin) {
     if (cells.size() == 1) return;  // one empty cell, which may be larger than a brick
-    int leaves = 0, empties = 0;
+    int empties = 0;
     for (const OctreeCell& cell : cells) {
-        const int number = cell.leaf ? leaves++ : -1 - empties++;
+        const int number = cell.leaf ? -1 : empties++;
         const openvdb::Coord o = cell.origin - origin_;
         const int blocks = cell.side / blockSide;
         for (int x = 0; x < blocks; ++x)

@@ -12,17 +12,15 @@
 
 namespace bilayer::detail {
 
-/// The cells of a brick. Leaves and the other, empty cells are numbered separately, in the order of the cells.
+/// The cells of a brick. Those without leaves, the empty cells, are numbered in their order.
 class WindingBrick {
   public:
     explicit WindingBrick(std::span<const OctreeCell> cells);
 
     std::span<const OctreeCell> cells() const { return cells_; }
 
-    /// Returns the number of the leaf that contains a voxel; negative if none does.
-    int leafAt(const openvdb::Coord& voxel) const { return contains(voxel) ? numberAt(voxel) : -1; }
     /// Returns the number of the empty cell that contains a voxel; negative if none does.
-    int emptyAt(const openvdb::Coord& voxel) const { return contains(voxel) ? -1 - numberAt(voxel) : -1; }
+    int emptyAt(const openvdb::Coord& voxel) const { return contains(voxel) ? numberAt(voxel) : -1; }
 
   private:
     bool contains(const openvdb::Coord& voxel) const {
@@ -35,7 +33,7 @@ class WindingBrick {
 
     std::span<const OctreeCell> cells_;
     openvdb::Coord origin_;
-    std::array<std::int16_t, blockVoxels> numbers_{};  // per block: of a leaf, or -1 - that of an empty cell
+    std::array<std::int16_t, blockVoxels> numbers_{};  // per block: of its empty cell; -1: a leaf
 };
 
 }  // namespace bilayer::detail

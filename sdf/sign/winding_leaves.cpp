@@ -1,165 +1,149 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sign is propagated from voxel to voxel as long as the number certainly stays on its side of one half.
 #include "sdf/sign/winding_leaves.h"
 
-#include <algorithm>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
 #include <utility>
 
-#include "sdf/sign/winding_steep_leaf.h"
+#include "sdf/base/progress.h"
+#include "sdf/bvh/winding_in_ball.h"
+#include "sdf/mesh/hole_caps.h"
+#include "sdf/sign/column_crossings.h"
 
 namespace bilayer::detail {
 namespace {
 
-/// Where the winding number may change by more than this per voxel, each voxel is asked for its own slope.
-constexpr double calmSlope = 0.02;
-/// Reserved part of the distance to one half, for voxels near the surface: two links of at most sqrt(3) voxels each.
-constexpr double reserve = 2 * 1.7320508075688772 * calmSlope;
+/// Sums of estimates are rounded by less.
+constexpr double rounding = 1e-9;
 
-class LeafSigns {
+glm::dvec3 position(const openvdb::Coord& voxel, double h) {
+    return glm::dvec3(voxel.x(), voxel.y(), voxel.z()) * h;
+}
+
+// A cube of voxels as a ball around their centres [m].
+struct Cube {
+    openvdb::Coord origin;
+    int side;
+    double h;
+    glm::dvec3 centre() const { return position(origin, h) + 0.5 * (side - 1) * h; }
+    double radius() const { return std::sqrt(3.0) / 2 * (side - 1) * h * (1 + 1e-9); }
+};
+
+class OpenLeaf {
   public:
-    LeafSigns(const WindingQuery& query, const WindingBrick& brick) : query_(query), brick_(brick) {
-        const float open = (0.5f + distanceSlack) * float(query.voxelSize);
-        for (const OctreeCell& cell : brick.cells()) {
-            if (!cell.leaf) continue;
-            // Links extend one voxel beyond a leaf.
-            const double slope = query.slopeIn(query.centre(cell.origin, cell.side), cell.side + 1);
-            leaves_.push_back({.leaf = cell.leaf, .slope = slope, .open = farther(*cell.leaf, open)});
-        }
-    }
+    using Numbers = std::array<std::int32_t, blockVoxels>;
 
-    void sign(const BandWidths& widths) {
-        for (std::size_t i = 0; i < leaves_.size(); ++i) {
-            LeafState& state = leaves_[i];
-            if (!state.calm()) {
-                signSteep(state);
-                continue;
-            }
-            for (unsigned voxel = 0; voxel < blockVoxels; ++voxel)
-                if (test(state.open, voxel) && !test(state.known, voxel)) propagate(i, voxel);
-        }
-        signNear();
-        for (LeafState& state : leaves_) signLeaf(*state.leaf, state.inside, widths);
+    /// @param closed  winding numbers of the mesh and its caps
+    OpenLeaf(const WindingNumber& winding, const WindingNumber& caps, const BandLeaf& leaf, const Numbers& closed,
+             double h)
+        : winding_(winding), caps_(caps), leaf_(leaf), closed_(closed), h_(h) {}
+
+    BlockMask inside() {
+        sign({leaf_.origin(), blockSide, h_});
+        return inside_;
     }
 
   private:
-    struct LeafState {
-        BandLeaf* leaf;
-        double slope;      // [1/voxel], for links that start in this leaf
-        BlockMask open{};  // voxels between which no link can cross the surface
-        BlockMask known{}, inside{};
-        BlockMask firm{};  // with `reserve` left to one half
-        BlockMask front{};
-        bool calm() const { return slope <= calmSlope; }
-    };
-
-    WindingSide decide(LeafState& state, unsigned voxel) {
-        const glm::dvec3 point = query_.position(state.leaf->offsetToGlobalCoord(voxel));
-        const WindingSide side = test(state.open, voxel) ? query_.around(point) : query_.at(point);
-        set(state.known, voxel);
-        if (side.inside) set(state.inside, voxel);
-        return side;
-    }
-
-    // Propagates over the open voxels of calm leaves, one step at a time, until the number may be too close to one
-    // half.
-    void propagate(std::size_t leaf, unsigned voxel) {
-        const WindingSide side = decide(leaves_[leaf], voxel);
-        double left = side.margin - reserve;
-        if (left <= 0) return;
-        set(leaves_[leaf].firm, voxel);
-        set(leaves_[leaf].front, voxel);
-        std::vector<std::size_t> wave{leaf};
-        while (!wave.empty()) {
-            double steepest = 0;
-            for (const std::size_t i : wave) steepest = std::max(steepest, leaves_[i].slope);
-            left -= steepest;
-            std::vector<std::pair<std::size_t, BlockMask>> arrivals;
-            for (const std::size_t i : wave) {
-                LeafState& from = leaves_[i];
-                arrivals.emplace_back(i, grown(from.front));
-                for (int face = 0; face < 6; ++face) {
-                    openvdb::Coord at = from.leaf->origin();
-                    at[face / 2] += face % 2 ? blockSide : -blockSide;
-                    const int neighbour = brick_.leafAt(at);
-                    if (neighbour < 0) continue;
-                    const BlockMask over = across(from.front, face / 2, face % 2);
-                    if (any(over)) arrivals.emplace_back(std::size_t(neighbour), over);
+    void sign(const Cube& cube) {
+        const WindingInBall caps(caps_, cube.centre(), cube.radius());
+        constexpr int octantSide = blockSide / 2;
+        if (cube.side > octantSide && caps.hasNear()) {
+            for (int octant = 0; octant < 8; ++octant)
+                sign({cube.origin.offsetBy(octant / 4 * octantSide, octant / 2 % 2 * octantSide,
+                                           octant % 2 * octantSide),
+                      octantSide, h_});
+            return;
+        }
+        for (int x = 0; x < cube.side; ++x)
+            for (int y = 0; y < cube.side; ++y)
+                for (int z = 0; z < cube.side; ++z) {
+                    const openvdb::Coord voxel = cube.origin.offsetBy(x, y, z);
+                    const unsigned offset = BandLeaf::coordToOffset(voxel);
+                    if (isInside(caps, offset, position(voxel, h_))) set(inside_, offset);
                 }
-                from.front = {};
-            }
-            wave.clear();
-            if (left < 0) return;
-            for (const auto& [i, mask] : arrivals) {
-                LeafState& to = leaves_[i];
-                if (!to.calm()) continue;
-                const bool waits = any(to.front);
-                for (std::size_t x = 0; x < blockSide; ++x) {
-                    const std::uint64_t fresh = mask[x] & to.open[x] & ~to.known[x];
-                    to.front[x] |= fresh;
-                    to.known[x] |= fresh;
-                    to.firm[x] |= fresh;
-                    if (side.inside) to.inside[x] |= fresh;
-                }
-                if (!waits && any(to.front)) wave.push_back(i);
-            }
-        }
     }
 
-    void signSteep(LeafState& state) {
-        const WindingSteepLeaf leaf(query_, *state.leaf);
-        for (std::uint64_t& word : state.known) word = ~std::uint64_t(0);
-        state.inside = leaf.inside();
-        state.firm = leaf.fartherThan(reserve);
+    bool isInside(const WindingInBall& caps, unsigned voxel, const glm::dvec3& point) const {
+        const auto aboveHalf = [&](const WindingNumber::Estimate& e) { return closed_[voxel] - e.value - 0.5; };
+        const auto decides = [&](const WindingNumber::Estimate& e) {
+            return std::abs(aboveHalf(e)) > e.error + rounding;
+        };
+        const WindingNumber::Estimate coarse = caps.coarseEstimate(point);
+        if (decides(coarse)) return aboveHalf(coarse) > 0;
+        const WindingNumber::Estimate fine = caps.estimate(point);
+        return decides(fine) ? aboveHalf(fine) > 0 : winding_.isInside(point);
     }
 
-    // Voxels near the surface take the sign of a neighbour that no surface can separate from them. The few others are
-    // evaluated.
-    void signNear() {
-        for (int pass = 0; pass < 2; ++pass) {
-            std::vector<BlockMask> firm(leaves_.size());
-            for (std::size_t i = 0; i < leaves_.size(); ++i) {
-                firm[i] = leaves_[i].firm;
-                for (unsigned voxel = 0; leaves_[i].calm() && voxel < blockVoxels; ++voxel)
-                    if (!test(leaves_[i].known, voxel)) copyNear(leaves_[i], voxel, firm[i]);
-            }
-            for (std::size_t i = 0; i < leaves_.size(); ++i) leaves_[i].firm = firm[i];
-        }
-        for (LeafState& state : leaves_)
-            for (unsigned voxel = 0; voxel < blockVoxels; ++voxel)
-                if (!test(state.known, voxel)) decide(state, voxel);
-    }
-
-    bool copyNear(LeafState& state, unsigned voxel, BlockMask& firm) {
-        const openvdb::Coord here = state.leaf->offsetToGlobalCoord(voxel);
-        const double h = query_.voxelSize, distance = double(state.leaf->buffer().data()[voxel]);
-        for (int link = 0; link < 27; ++link) {
-            const openvdb::Coord step(link / 9 - 1, link / 3 % 3 - 1, link % 3 - 1), there = here + step;
-            const int neighbour = link == 13 ? -1 : brick_.leafAt(there);
-            if (neighbour < 0) continue;
-            const LeafState& other = leaves_[std::size_t(neighbour)];
-            const unsigned at = BandLeaf::coordToOffset(there);
-            if (!test(other.firm, at)) continue;
-            const double length = std::sqrt(double(step.x() * step.x() + step.y() * step.y() + step.z() * step.z())) +
-                                  double(distanceSlack);
-            if (distance + double(other.leaf->buffer().data()[at]) <= length * h) continue;
-            set(state.known, voxel);
-            set(firm, voxel);
-            if (test(other.inside, at)) set(state.inside, voxel);
-            return true;
-        }
-        return false;
-    }
-
-    const WindingQuery& query_;
-    const WindingBrick& brick_;
-    std::vector<LeafState> leaves_;
+    const WindingNumber &winding_, &caps_;
+    const BandLeaf& leaf_;
+    const Numbers& closed_;
+    const double h_;
+    BlockMask inside_{};
 };
+
+// Calls visit(leaf, numbers) for each leaf, with the winding numbers of a closed mesh along its columns.
+template <class Visit>
+void forEachLeaf(const std::vector<BandLeaf*>& leaves, const Mesh& closed, double h, Progress* progress,
+                 const Visit& visit) {
+    const ColumnCrossings columns(leaves, closed, h, false, progress);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns.tiles()), [&](const auto& range) {
+        ColumnCrossings::OfTile crossings;
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            ColumnNumbers numbers;
+            columns.forEachLeaf(i, crossings, [&](BandLeaf& leaf, auto found, std::uint64_t) {
+                poll(progress);
+                const std::uint64_t crossed = numbers.enter(leaf, found);
+                visit(leaf, numbers, crossed);
+            });
+        }
+    });
+}
+
+void signClosed(BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t crossed, const BandWidths& widths) {
+    BlockMask inside{};
+    for (std::size_t column = 0; column < columnsPerLeaf; ++column) {
+        std::uint64_t bits = 0;
+        if (crossed >> column & 1)
+            numbers.climb(column, [&](int k, std::int32_t number) { bits |= std::uint64_t(number > 0) << k; });
+        else if (numbers.below(column) > 0)
+            bits = 0xff;
+        inside[column / blockSide] |= bits << (column % blockSide * blockSide);
+    }
+    signLeaf(leaf, inside, widths);
+}
+
+void signOpen(BandLeaf& leaf, ColumnNumbers& numbers, const WindingNumber& winding, const WindingNumber& caps,
+              const BandWidths& widths) {
+    OpenLeaf::Numbers closed;
+    for (std::size_t column = 0; column < columnsPerLeaf; ++column)
+        numbers.climb(column,
+                      [&](int k, std::int32_t number) { closed[column * blockSide + std::size_t(k)] = number; });
+    signLeaf(leaf, OpenLeaf(winding, caps, leaf, closed, double(widths.voxelSize)).inside(), widths);
+}
 
 }  // namespace
 
-void signLeaves(const WindingQuery& query, const WindingBrick& brick, const BandWidths& widths) {
-    LeafSigns(query, brick).sign(widths);
+void signLeaves(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, const WindingNumber& winding,
+                const BandWidths& widths, bool closed, Progress* progress) {
+    const auto h = double(widths.voxelSize);
+    std::vector<glm::uvec3> caps = closed ? std::vector<glm::uvec3>() : holeCaps(mesh, progress);
+    if (caps.empty())
+        return forEachLeaf(leaves, mesh, h, progress,
+                           [&](BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t crossed) {
+                               signClosed(leaf, numbers, crossed, widths);
+                           });
+    Mesh capped{mesh.points, std::move(caps)};
+    const WindingNumber ofCaps(capped, progress);
+    capped.triangles.insert(capped.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
+    forEachLeaf(leaves, capped, h, progress, [&](BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t) {
+        signOpen(leaf, numbers, winding, ofCaps, widths);
+    });
 }
 
 }  // namespace bilayer::detail
