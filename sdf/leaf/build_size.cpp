@@ -22,8 +22,9 @@ namespace {
 /// Maximum count of cubes of countedSide voxels a side in the mesh's box, which is then 40,000 voxels long.
 constexpr int countedSide = 64;
 constexpr double maxCubes = double(1u << 28);
-/// Approximate memory of a build per triangle (bins or hierarchy) and per block [bytes].
-constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
+/// Approximate memory of a build per triangle (bins or hierarchy) and per block [bytes]. The field itself has 2,200 per
+/// block; what builds and writes it takes 800 to 1,700 more.
+constexpr double bytesPerTriangle = 60, bytesPerBlock = 4000;
 
 // Estimates the count of blocks that the band meets. It is the volume near the surface or, for a surface that folds
 // over itself, near its bounding box.
