@@ -76,7 +76,7 @@ TEST_CASE("the memory that a process may use limits its builds") {
     CHECK(buildAt("300").status == 0);
     const Result r = buildAt("2400");
     CHECK(r.status == 1);
-    CHECK(r.err.find("1.9 GiB of memory, and 0.5 GiB may be used") != std::string::npos);
+    CHECK(r.err.find("1.8 GiB of memory, and 0.5 GiB may be used") != std::string::npos);
 }
 
 #endif
