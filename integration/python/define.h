@@ -146,8 +146,9 @@ void defineConstructorAs(py::class_<Class, Extra...>& type, const char* doc,
 template <class Class, class... Extra, class Unpack, class Pack>
 void defineReduce(py::class_<Class, Extra...>& type, const char* doc, Unpack unpack, Pack pack) {
     defineStatic(type, doc, unpack);
-    const std::string_view name = std::string_view(doc).substr(0, std::string_view(doc).find('('));
-    type.def("__reduce__", [make = type.attr(std::string(name).c_str()), pack](const Class& self) {
+    const std::string name(doc, std::string_view(doc).find('('));
+    const py::object make = type.attr(name.c_str());
+    type.def("__reduce__", [make, pack](const Class& self) {
         return py::make_tuple(make, py::make_tuple(pack(self)));
     });
 }

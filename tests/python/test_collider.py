@@ -79,7 +79,7 @@ def test_collider(box, box_set, collider, sphere):
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.Collider(box, box_set, **options)
-    with pytest.raises(ValueError, match="mesh: the level set is of another mesh"):
+    with pytest.raises(ValueError, match="level_set: the level set is of another mesh"):
         bilayer.Collider(sphere, box_set)
     for swapped, call in (
         (lambda: bilayer.Collider(box_set, box), r"Collider\(mesh, level_set\)"),

@@ -80,7 +80,7 @@ def test_particles(tank):
     assert np.linalg.norm(moved - [5, 0, 0], axis=1).max() <= 0.6 + 1e-5
     for arguments, message in (
         ({"per_voxel": 0}, "per_voxel must be in 1..1000"),
-        ({"pose": bilayer.Pose()}, "pose, voxel_size: expected None"),
+        ({"pose": bilayer.Pose()}, "pose, scale, voxel_size: expected no values"),
         ({"seed": -1}, "seed is -1, and must be an integer from 0 to 18446744073709551615"),
         ({"seed": 1.5}, "seed: expected an integer, got a 'float'"),
     ):
