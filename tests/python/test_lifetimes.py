@@ -149,7 +149,9 @@ def test_memory_does_not_grow(box):
     assert resident_bytes() - before < 8 << 20
 
 
-@pytest.mark.parametrize("call", ["bilayer.build(mesh, resolution=200)", "field.closest(points)", "level_set.surface()"])
+@pytest.mark.parametrize(
+    "call", ["bilayer.build(mesh, resolution=200)", "field.closest(points)", "level_set.surface()"]
+)
 def test_daemon_threads_end_with_the_process(call):
     script = f"""
 import threading, time
