@@ -29,7 +29,7 @@ std::uint64_t Collider::id() const {
 
 const MassProperties& Collider::mass() const {
     if (!data_->body.mass)
-        throw std::invalid_argument("collider: the body encloses no volume, or its inertia is beyond single precision");
+        throw std::invalid_argument("the body encloses no volume, or its inertia is beyond single precision");
     return *data_->body.mass;
 }
 

@@ -53,15 +53,14 @@ MassProperties massOf(const Mesh& mesh, const std::vector<int>& copies) {
     const glm::dvec3 origin = 0.5 * (glm::dvec3(box.lower) + glm::dvec3(box.upper));
     Integrals sum = integrate(mesh, copies, origin);
     if (!(std::abs(sum.volume) > minThickness * sum.area * double(box.longestSide())))
-        throw std::invalid_argument("mass properties: the mesh encloses no volume");
+        throw std::invalid_argument("the mesh encloses no volume");
     if (sum.volume < 0) {
         sum.volume = -sum.volume;
         sum.first = -sum.first;
         sum.second = -sum.second;
     }
     const MassProperties result = massProperties(sum, origin);
-    if (!(result.principalInertia.x > 0))
-        throw std::invalid_argument("mass properties: the mesh does not bound a solid");
+    if (!(result.principalInertia.x > 0)) throw std::invalid_argument("the mesh does not bound a solid");
     return result;
 }
 
@@ -118,14 +117,13 @@ MassProperties detail::massProperties(const Moments& moments, const glm::dvec3& 
     const double smallest = principal.values[0], largest = principal.values[2];
     if (smallest > 0 &&
         !(smallest >= std::numeric_limits<float>::min() && largest <= std::numeric_limits<float>::max()))
-        throw std::invalid_argument(
-            "mass properties: the moments of inertia are beyond single precision: scale the mesh");
+        throw std::invalid_argument("the moments of inertia are beyond single precision: scale the mesh");
     return result;
 }
 
 MassProperties detail::unionMass(const Mesh& closed) {
     const LabelledMesh boundary = unionBoundary(closed);
-    if (boundary.mesh.triangles.empty()) throw std::invalid_argument("mass properties: the mesh encloses no volume");
+    if (boundary.mesh.triangles.empty()) throw std::invalid_argument("the mesh encloses no volume");
     return massOf(boundary.mesh, boundary.labels);
 }
 

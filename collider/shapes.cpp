@@ -82,7 +82,7 @@ ContactShape ContactShape::spheres(std::span<const SphereOfHull> spheres) {
         if (!isFinite(sphere.centre)) throw std::invalid_argument("the centre of a sphere is not finite");
         largest = std::max(largest, sphere.radius);
     }
-    requirePositive(largest, "largest radius");
+    if (!(largest > 0)) throw std::invalid_argument("the radii are all 0, and one must be above 0");
     return ContactShape(ContactShapeData{Convex::spheres({spheres.begin(), spheres.end()})});
 }
 

@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <variant>
 
 #include "collider/contact/advancement.h"
@@ -31,13 +33,14 @@ constexpr int maxDistances = 10000;
 /// A body that rotates by more has no motion of one step [rad].
 constexpr float maxRotation = 1000;
 
-void check(const Motion& motion) {
+// The name of the motion begins errors: "motion a".
+void check(const Motion& motion, const std::string& name) {
     if (!isFinite(motion.displacement) || !isFinite(motion.rotation))
-        throw std::invalid_argument(fmt::format("the motion must be finite, not {}, {}, {} m and {}, {}, {} rad",
+        throw std::invalid_argument(fmt::format("{} must be finite, not {}, {}, {} and {}, {}, {} rad", name,
                                                 motion.displacement.x, motion.displacement.y, motion.displacement.z,
                                                 motion.rotation.x, motion.rotation.y, motion.rotation.z));
     if (glm::length(glm::dvec3(motion.rotation)) > maxRotation)
-        throw std::invalid_argument(fmt::format("the motion rotates by {:g} rad; at most {:g} rad are allowed",
+        throw std::invalid_argument(fmt::format("{} rotates by {:g} rad; at most {:g} rad are allowed", name,
                                                 glm::length(motion.rotation), maxRotation));
 }
 
@@ -63,12 +66,12 @@ Extent extentOf(const Convex& convex, double scale) {
     return {scale * radius, 2 * scale * radius};
 }
 
-Extent extentOf(const PlacedShape& body) {
+Extent extentOf(const PlacedShape& body, const std::string& motion) {
     const auto& shape = body.shape.data().shape;
     if (body.shape.collider()) return extentOf(placed(body));
     if (const auto* convex = std::get_if<Convex>(&shape)) return extentOf(*convex, double(body.scale));
     if (body.motion.rotation != glm::vec3(0))
-        throw std::invalid_argument("a plane or a sheet of triangles has no end, and must not rotate");
+        throw std::invalid_argument(motion + " rotates a plane or a sheet of triangles, which has no end");
     return {};
 }
 
@@ -80,17 +83,19 @@ double toleranceFor(const Extent& a, const Extent& b, float asked) {
 /// A body and its motion.
 struct MovingBody {
     const PlacedShape& body;
+    std::string motion;  ///< its name in errors
     Sweep sweep;
 
-    explicit MovingBody(const PlacedShape& placed) : body(placed), sweep(placed.pose, placed.motion) {
-        check(placed.motion);
+    MovingBody(const PlacedShape& placed, std::string name)
+        : body(placed), motion(std::move(name)), sweep(placed.pose, placed.motion) {
+        check(placed.motion, motion);
     }
     PlacedShape at(double fraction) const { return {body.shape, sweep.at(fraction), body.scale}; }
     SweptShape swept() const { return {body.shape, sweep, {}, body.scale}; }
 };
 
 Impact firstTouch(const MovingBody& a, const MovingBody& b, float askedTolerance) {
-    const Extent ofA = extentOf(a.body), ofB = extentOf(b.body);
+    const Extent ofA = extentOf(a.body, a.motion), ofB = extentOf(b.body, b.motion);
     const double tolerance = toleranceFor(ofA, ofB, askedTolerance);
     const double approach = maxApproach(a.sweep, ofA.radius, b.sweep, ofB.radius);
     const auto fractionAt = [&](double travelled) { return approach > 0 ? travelled / approach : 0; };
@@ -123,7 +128,7 @@ Impact penetration(const MovingBody& a, const MovingBody& b) {
 
 Impact timeOfImpact(const PlacedShape& a, const PlacedShape& b, const ImpactOptions& options) {
     orderOf(a, b);
-    const MovingBody movingA(a), movingB(b);
+    const MovingBody movingA(a, "motion a"), movingB(b, "motion b");
     return options.penetration ? penetration(movingA, movingB) : firstTouch(movingA, movingB, options.tolerance);
 }
 

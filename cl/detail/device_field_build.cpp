@@ -184,7 +184,7 @@ Summary DeviceFieldBuilder::readSummary() {
 void DeviceFieldBuilder::computeFrame() {
     const Summary summary = readSummary();
     if (summary.activeLower[0] > summary.activeUpper[0])
-        throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
+        throw std::invalid_argument("the half width is too small for this voxel size: no voxel lies within the band");
     FieldFrame& frame = layout_.frame;
     firstVoxel_ = vectorOf(summary.blockLower);
     frame.blocks = (vectorOf(summary.blockUpper) - firstVoxel_) / blockSide + 1;

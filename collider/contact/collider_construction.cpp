@@ -67,10 +67,10 @@ Field fieldOf(const LevelSet& levelSet, const Body& body) {
 }  // namespace
 
 Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& options) {
-    if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
+    if (!std::isfinite(options.margin)) throw std::invalid_argument("the margin is not finite");
     if (options.margin > maxMargin * levelSet.voxelSize())
         throw std::invalid_argument(
-            fmt::format("collider: a margin of {:g} m is wider than {} voxels", options.margin, maxMargin));
+            fmt::format("the margin of {:g} is wider than {} voxels", options.margin, maxMargin));
     Mesh oriented = orientedMesh(levelSet, std::move(given));
     auto mass = massOf(oriented, levelSet);
     Filled filled = filledMesh(outerSurface(levelSet, std::move(oriented)), levelSet);

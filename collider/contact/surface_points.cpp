@@ -251,11 +251,11 @@ void addNode(const std::vector<SurfacePoint>& points, std::vector<PointNode>& no
 
 SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing) {
     if (!(spacing > 0 && std::isfinite(spacing)))
-        throw std::invalid_argument("surface points: the spacing must be positive and finite");
+        throw std::invalid_argument("the spacing must be positive and finite");
     validate(mesh);
     const Mesh welded = weld(mesh);
     points_ = thin(Candidates(welded, latticePitch * spacing).result, spacing);
-    if (points_.empty()) throw std::invalid_argument("surface points: all triangles of the mesh are degenerate");
+    if (points_.empty()) throw std::invalid_argument("all triangles of the mesh are degenerate");
     order(points_, 0, std::uint32_t(points_.size()));
     addNode(points_, nodes_, 0, std::uint32_t(points_.size()));
 }

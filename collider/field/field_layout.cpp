@@ -41,7 +41,7 @@ bool needsBlock(const FloatTree::LeafNodeType& leaf) {
 }
 
 [[noreturn]] void throwTooLong() {
-    throw std::invalid_argument("field: the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
+    throw std::invalid_argument("the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
 }
 
 // Sorts blocks in Morton order, so that blocks that are close in space are close in memory.
@@ -179,7 +179,7 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
 
 void FieldFrame::requireSize() const {
     if (double(blocks.x) * blocks.y * blocks.z > double(maxBlocks))
-        throw std::invalid_argument("field: the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
+        throw std::invalid_argument("the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
     if (std::max({blocks.x, blocks.y, blocks.z}) > maxBlocksAlong) throwTooLong();
 }
 
@@ -204,7 +204,7 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
             origins.push_back(leaves.leaf(i).origin());
             box.expand(origins.back());
         }
-    if (origins.empty()) throw std::invalid_argument("field: the level set has no voxel in its band");
+    if (origins.empty()) throw std::invalid_argument("the level set has no voxel in its band");
 
     // in 64 bits: the extent of a file's data may exceed an int
     for (int axis = 0; axis < 3; ++axis)

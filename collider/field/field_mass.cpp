@@ -207,7 +207,7 @@ MassProperties massProperties(const LevelSet& levelSet) {
         },
         [](Moments a, const Moments& b) { return a += b; });
     integrator.addTiles(sum);
-    if (!(sum.volume > minVolume)) throw std::invalid_argument("mass properties: the field has no inside");
+    if (!(sum.volume > minVolume)) throw std::invalid_argument("the field has no inside");
 
     const double h = grid.voxelSize()[0];
     sum.volume *= h * h * h;

@@ -169,20 +169,20 @@ void addVelocity(Solid& solid, const Velocity& velocity, const glm::vec3& centre
 }
 
 void check(const SolidOptions& options, const Transform& cells) {
-    if (!cells.isLinear() || !cells.hasUniformScale()) throw std::invalid_argument("solid: the cells must be cubes");
+    if (!cells.isLinear() || !cells.hasUniformScale()) throw std::invalid_argument("the cells must be cubes");
     const double voxel = cells.voxelSize()[0];
     for (int axis = 0; axis < 3; ++axis) {
         openvdb::Vec3d unit(0);
         unit[axis] = 1;
         const openvdb::Vec3d edge = cells.indexToWorld(unit) - cells.indexToWorld(openvdb::Vec3d(0));
         if (!(edge[axis] > (1 - axisTolerance) * voxel))
-            throw std::invalid_argument("solid: the cells' axes are not those of the world");
+            throw std::invalid_argument("the cells' axes are not those of the world");
     }
     const float lengths = glm::length(options.velocity.linear) + glm::length(options.velocity.angular);
-    if (!std::isfinite(lengths)) throw std::invalid_argument("solid: the velocity is not finite");
+    if (!std::isfinite(lengths)) throw std::invalid_argument("the velocity is not finite");
     if (!(options.halfWidthVoxels >= minHalfWidth && options.halfWidthVoxels <= maxHalfWidth))
         throw std::invalid_argument(
-            fmt::format("solid: halfWidthVoxels must be in 3..1000, not {:g}", options.halfWidthVoxels));
+            fmt::format("halfWidthVoxels must be in 3..1000, not {:g}", options.halfWidthVoxels));
 }
 
 // The progress of one of the two equal halves of the work; none if there is no listener.

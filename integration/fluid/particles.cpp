@@ -61,10 +61,9 @@ Vec3d jitter(std::uint64_t bits) {
 }
 
 void require(const openvdb::math::Transform& voxels, const ParticleOptions& options) {
-    if (!voxels.isLinear() || !voxels.hasUniformScale())
-        throw std::invalid_argument("particles: the voxels must be cubes");
+    if (!voxels.isLinear() || !voxels.hasUniformScale()) throw std::invalid_argument("the voxels must be cubes");
     if (options.perVoxel < 1 || options.perVoxel > maxPerVoxel)
-        throw std::invalid_argument("particles: perVoxel must be in 1..1000");
+        throw std::invalid_argument("perVoxel must be in 1..1000");
 }
 
 // The leaves that may hold liquid, and the interior tiles cut into blocks of a leaf's size.
@@ -147,7 +146,7 @@ class Body {
         }
         const Vec3d size = (upper - lower) / double(blockSide) + Vec3d(2);
         if (!(size.x() * size.y() * size.z() <= maxBlocks && std::max(upper.length(), lower.length()) < maxIndex))
-            throw std::invalid_argument("particles: the body is out of range of these voxels");
+            throw std::invalid_argument("the body is out of range of these voxels");
         const Coord from = Coord::floor(lower - Vec3d(1)) & ~(blockSide - 1), to = Coord::ceil(upper + Vec3d(1));
         std::vector<Coord> origins;
         for (int x = from.x(); x <= to.x(); x += blockSide)
@@ -187,7 +186,7 @@ class Body {
 
 Particles particles(const FloatGrid& liquid, const ParticleOptions& options) {
     if (liquid.getGridClass() != openvdb::GRID_LEVEL_SET)
-        throw std::invalid_argument("particles: the liquid's grid is no level set");
+        throw std::invalid_argument("the liquid's grid is no level set");
     require(liquid.transform(), options);
     const double limit = farOutside * liquid.voxelSize()[0];
     return gather(blocks(liquid), options, [&](const Coord& origin, std::vector<glm::vec3>& found) {

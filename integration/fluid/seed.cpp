@@ -26,7 +26,7 @@ using openvdb::FloatTree;
 constexpr float rounding = 1e-5f;  // tolerance of a half width that is a whole number of voxels
 
 [[noreturn]] void refuse(const std::string& why) {
-    throw std::invalid_argument("seed: " + why);
+    throw std::invalid_argument(why);
 }
 
 void requireLiquid(const FloatGrid& liquid) {

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
@@ -14,6 +16,7 @@
 
 #include "integration/python/arrays.h"
 #include "integration/python/convert.h"
+#include "sdf/leaf/build_options.h"
 
 namespace bilayer::python {
 namespace {
@@ -61,6 +64,11 @@ void requirePositive(double value, const char* name) {
         throw std::invalid_argument(fmt::format("{} is {}, and must be above 0 and finite", name, value));
 }
 
+void requireVoxelSize(double value, const char* name) {
+    requirePositive(value, name);
+    bilayer::detail::checkVoxelSize(float(value), name);
+}
+
 void requireNotNegative(double value, const char* name) {
     if (!(value >= 0) || !std::isfinite(value))
         throw std::invalid_argument(fmt::format("{} is {}, and must be 0 or above, and finite", name, value));
@@ -69,7 +77,10 @@ void requireNotNegative(double value, const char* name) {
 Path pathOf(const py::object& object, const char* name) {
     if (!py::isinstance<py::str>(object) && !py::isinstance<py::bytes>(object) && !py::hasattr(object, "__fspath__"))
         refuseType(name, "a str, bytes or os.PathLike", object);
-    return {py::module_::import("os").attr("fsdecode")(object).cast<std::string>()};
+    const auto text = py::module_::import("os").attr("fsencode")(object).cast<std::string>();
+    if (text.find('\0') != std::string::npos)
+        throw std::invalid_argument(fmt::format("{}: expected a path without null bytes", name));
+    return {text};
 }
 
 void requireExisting(const Path& path) {
@@ -78,6 +89,21 @@ void requireExisting(const Path& path) {
     errno = ENOENT;
     PyErr_SetFromErrnoWithFilename(PyExc_FileNotFoundError, path.text.c_str());
     throw py::error_already_set();
+}
+
+void requireExtension(const Path& path, std::initializer_list<std::string_view> extensions) {
+    std::string file = path.text, expected;
+    std::transform(file.begin(), file.end(), file.begin(),
+                   [](unsigned char letter) { return char(std::tolower(letter)); });
+    for (const std::string_view extension : extensions) {
+        if (file.ends_with(extension)) return;
+        expected += fmt::format("{}{}",
+                                expected.empty()                       ? ""
+                                : extension == *(extensions.end() - 1) ? " or "
+                                                                       : ", ",
+                                extension);
+    }
+    throw std::invalid_argument(fmt::format("path: expected a name that ends in {}, got '{}'", expected, path.text));
 }
 
 }  // namespace bilayer::python

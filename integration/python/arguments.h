@@ -5,6 +5,7 @@
 #include <pybind11/pybind11.h>
 
 #include <array>
+#include <initializer_list>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -53,6 +54,9 @@ Value byWord(const std::array<std::pair<const char*, Value>, count>& words, cons
 /// Throws std::invalid_argument that names the argument unless a number is above 0 and finite.
 void requirePositive(double value, const char* name);
 
+/// Throws std::invalid_argument that names the argument unless voxels may have this size.
+void requireVoxelSize(double value, const char* name);
+
 /// Throws std::invalid_argument that names the argument unless a number is 0 or above, and finite.
 void requireNotNegative(double value, const char* name);
 
@@ -64,5 +68,8 @@ struct Path {
 Path pathOf(const py::object& object, const char* name);
 /// Raises FileNotFoundError unless the file exists.
 void requireExisting(const Path& path);
+/// Throws std::invalid_argument unless the argument `path` ends in one of the extensions, as ".ply", in any case of
+/// letters.
+void requireExtension(const Path& path, std::initializer_list<std::string_view> extensions);
 
 }  // namespace bilayer::python

@@ -11,6 +11,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "integration/python/without_gil.h"
+
 namespace bilayer::python {
 namespace {
 
@@ -128,14 +130,14 @@ void Floats::convert(const py::array& array, Range range) {
         if (!doubles) refuse(name_, "numbers in the range of float32", description(array, array));
         array_ = py::array_t<float, py::array::c_style>(wholeShape());
         float* const to = array_.mutable_data();
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         check(doubles.data(), doubles.size());
         std::transform(doubles.data(), doubles.data() + doubles.size(), to, [](double value) { return float(value); });
         return;
     }
     array_ = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(array);
     if (!array_) throw py::error_already_set();
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     check(array_.data(), array_.size());
 }
 
@@ -189,7 +191,7 @@ std::vector<std::uint32_t> indices(const py::handle& object, const char* name, p
     if (!values) throw py::error_already_set();
     const std::int64_t* const data = values.data();
     const Shape whole(array.shape(), array.shape() + array.ndim());
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     std::vector<std::uint32_t> result(static_cast<std::size_t>(values.size()));
     for (std::size_t i = 0; i < result.size(); ++i) {
         const auto value = std::uint64_t(data[i]);

@@ -16,7 +16,9 @@
 #include "integration/python/bindings.h"
 #include "integration/python/cancellable.h"
 #include "integration/python/define.h"
+#include "integration/python/without_gil.h"
 #include "sdf/base/method_names.h"
+#include "sdf/leaf/build_options.h"
 
 namespace bilayer::python {
 namespace {
@@ -46,11 +48,18 @@ class Keywords {
     py::dict given_;
 };
 
-void setVoxelSize(const Keywords& keywords, const Mesh& mesh, BuildOptions& options) {
+// With neither option, voxels are those of the old level set, if there is one.
+void setVoxelSize(const Keywords& keywords, const Mesh& mesh, const LevelSet* old, BuildOptions& options) {
     const auto size = keywords.positive("voxel_size"), resolution = keywords.positive("resolution");
-    if (bool(size) == bool(resolution))
-        throw std::invalid_argument("voxel_size, resolution: expected exactly one of them");
-    options.voxelSize = size ? float(*size) : voxelSizeFor(mesh, float(*resolution));
+    if ((size && resolution) || (!size && !resolution && !old))
+        throw std::invalid_argument(
+            fmt::format("voxel_size, resolution: expected {} one of them", old ? "at most" : "exactly"));
+    if (size)
+        options.voxelSize = float(*size);
+    else if (resolution)
+        options.voxelSize = voxelSizeFor(mesh, float(*resolution));
+    else
+        options.voxelSize = float(old->voxelSize());
 }
 
 void setBand(const Keywords& keywords, BuildOptions& options) {
@@ -61,11 +70,14 @@ void setBand(const Keywords& keywords, BuildOptions& options) {
         throw std::invalid_argument(
             "half_width: expected only one of half_width, half_width_voxels, and exterior_width_voxels with "
             "interior_width_voxels");
-    if (world && *world > 1000 * double(options.voxelSize))
+    if (voxels && *voxels > double(bilayer::detail::maxWidthVoxels))
+        throw std::invalid_argument(fmt::format("half_width_voxels is {:g}, and must be at most {:g}", *voxels,
+                                                bilayer::detail::maxWidthVoxels));
+    if (world && *world > double(bilayer::detail::maxWidthVoxels) * double(options.voxelSize))
         throw std::invalid_argument(fmt::format(
-            "half_width is {:g} in the mesh's unit, which is {:.0f} voxels of {:g}, and must be at most 1000 voxels; "
+            "half_width is {:g} in the mesh's unit, which is {:.0f} voxels of {:g}, and must be at most {:g} voxels; "
             "half_width_voxels takes voxels",
-            *world, *world / double(options.voxelSize), options.voxelSize));
+            *world, *world / double(options.voxelSize), options.voxelSize, bilayer::detail::maxWidthVoxels));
     if (world || voxels)
         options.exteriorWidthVoxels = options.interiorWidthVoxels =
             voxels ? float(*voxels) : float(*world / double(options.voxelSize));
@@ -87,15 +99,15 @@ std::optional<OpenclFiller> fillerOf(const std::string& device) {
     if (device != opencl && !named)
         throw std::invalid_argument(fmt::format(
             "device: expected 'cpu', 'opencl' or 'opencl:' and a part of a device's name, got '{}'", device));
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return openclFiller(openDevice(named ? device.substr(opencl.size() + 1) : ""));
 }
 
-Request requestOf(const Options& given, const Mesh& mesh) {
+Request requestOf(const Options& given, const Mesh& mesh, const LevelSet* old = nullptr) {
     const Keywords keywords(given.values);
     Request request;
     BuildOptions& options = request.options;
-    setVoxelSize(keywords, mesh, options);
+    setVoxelSize(keywords, mesh, old, options);
     setBand(keywords, options);
     if (const auto word = keywords.take<std::string>("method"))
         options.method = byWord(bilayer::detail::methodNames, *word, "method");
@@ -113,6 +125,8 @@ Request requestOf(const Options& given, const Mesh& mesh) {
     if (!request.progress.is_none() && !PyCallable_Check(request.progress.ptr()))
         refuseType("progress", "a callable", request.progress);
     if (const auto device = keywords.take<std::string>("device")) request.filler = fillerOf(*device);
+    if (options.method == Method::prism && !request.filler)
+        throw std::invalid_argument("method: 'prism' needs a build on an OpenCL device: device=\"opencl\"");
     return request;
 }
 
@@ -144,7 +158,7 @@ std::vector<std::uint32_t> movedTriangles(const Mesh& before, const Mesh& after)
 
 LevelSet rebuildField(const LevelSet& old, const SharedMesh& before, const SharedMesh& after, const py::object& moved,
                       const Options& options) {
-    Request request = requestOf(options, *before);
+    Request request = requestOf(options, *before, &old);
     std::vector<std::uint32_t> triangles;
     if (!moved.is_none()) triangles = indices(moved, "moved", 1, after->triangles.size(), "a face");
     return run(request, [&, given = !moved.is_none()](const BuildOptions& options) {
@@ -154,7 +168,7 @@ LevelSet rebuildField(const LevelSet& old, const SharedMesh& before, const Share
 
 py::list listDevices() {
     const std::vector<DeviceInfo> found = [] {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         return devices();
     }();
     py::list list;
@@ -210,7 +224,8 @@ constexpr const char* rebuildDoc =
         delta=0.5, epsilon=1, neighbourhood=2, max_subdivision=32, progress=None) -> LevelSet
 
 Updates a field after some faces of its mesh have moved. Fills only the blocks near those; the bytes equal those of
-build(new_mesh, ...). Needs the options of the build that made `level_set`; `resolution` refers to old_mesh.
+build(new_mesh, ...). Needs the options of the build that made `level_set`. Without resolution and voxel_size, voxels
+are those of `level_set`; `resolution` refers to old_mesh.
 
 moved: integers of shape (K,), all faces with a corner that moved; None compares the vertices.
 
@@ -223,7 +238,7 @@ numbers of faces, or a face has moved that `moved` does not list.
 >>> vertices = old.vertices.copy()
 >>> vertices[0] -= 0.1
 >>> new = bilayer.Mesh(vertices, old.faces)
->>> bilayer.rebuild(level_set, old, new, voxel_size=0.05) == bilayer.build(new, voxel_size=0.05)
+>>> bilayer.rebuild(level_set, old, new) == bilayer.build(new, voxel_size=0.05)
 True
 )";
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integration/python/cancellable.h"
 
+#include <cxxabi.h>
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
@@ -19,6 +20,7 @@
 #include <bilayer/sdf/options.h>
 
 #include "integration/python/convert.h"
+#include "integration/python/without_gil.h"
 
 namespace bilayer::python {
 namespace {
@@ -121,7 +123,7 @@ void runCancellable(const py::object& progress, const std::function<void(const L
     std::unique_ptr<Worker> worker = Workers::all().take();
     std::future<void> running = worker->start([&] { job(listener); });
     const auto finished = [&] {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         return running.wait_for(pollInterval) == std::future_status::ready;
     };
     while (!finished()) {
@@ -129,6 +131,8 @@ void runCancellable(const py::object& progress, const std::function<void(const L
         try {
             throwIfSignalled();
             if (!report(progress, fraction)) cancelled = true;
+        } catch (abi::__forced_unwind&) {
+            waitForExit();
         } catch (...) {
             raised = std::current_exception();
             cancelled = true;
@@ -140,9 +144,8 @@ void runCancellable(const py::object& progress, const std::function<void(const L
         if (!raised) raised = std::current_exception();
     }
     Workers::all().giveBack(std::move(worker));
-    if (!raised && cancelled) raised = std::make_exception_ptr(Cancelled());  // requested in the last moment
     if (raised) std::rethrow_exception(raised);
-    report(progress, 1);
+    if (cancelled || !report(progress, 1)) throw Cancelled();  // requested in the last moment
 }
 
 void answerInParts(std::size_t count, std::size_t part,
@@ -152,7 +155,7 @@ void answerInParts(std::size_t count, std::size_t part,
         const std::size_t end = begin + std::min(round, count - begin);
         const Clock::time_point start = Clock::now();
         {
-            const py::gil_scoped_release release;
+            const WithoutGil release;
             if (end - begin <= part)
                 answer(begin, end);
             else

@@ -15,6 +15,7 @@
 #include "integration/python/bindings.h"
 #include "integration/python/define.h"
 #include "integration/python/objects.h"
+#include "integration/python/without_gil.h"
 
 namespace bilayer::python {
 namespace {
@@ -38,11 +39,11 @@ py::object massOf(const py::object& solid) {
     std::optional<MassProperties> mass;
     if (py::isinstance<LevelSet>(solid)) {
         const auto& levelSet = solid.cast<const LevelSet&>();
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         mass = massProperties(levelSet);
     } else {
         const SharedMesh mesh = meshOf(solid, "solid");
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         mass = massProperties(*mesh);
     }
     return toResult(*mass);
@@ -71,7 +72,7 @@ ColliderObject makeCollider(const py::object& mesh, const py::object& levelSet, 
         py::module_::import("functools").attr("partial")(py::type::of<ColliderObject>(), **keywords);
     const py::tuple recipe = py::make_tuple(make, py::make_tuple(shared, distances));
     const auto collider = [&] {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         return Collider(*shared, distances, options);
     };
     return {collider(), recipe, distances.origin()};
@@ -83,13 +84,13 @@ LevelSet storeBody(const py::object& levelSet, const py::object& mesh, float poi
     const auto& distances = argument<const LevelSet&>(levelSet, "level_set");
     const SharedMesh shared = meshOf(mesh, "mesh");
     const ColliderOptions options = optionsOf(pointSpacing, margin, accuracy);
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return withBody(distances, *shared, options, keepMesh);
 }
 
 ColliderObject restore(const LevelSet& levelSet) {
     const auto collider = [&] {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         return Collider(levelSet);
     };
     const py::object make = py::type::of<ColliderObject>().attr("from_level_set");
@@ -100,7 +101,7 @@ ColliderObject restore(const LevelSet& levelSet) {
 FieldObject fieldOf(const py::object& self, const Field& (Collider::*member)() const, const char* attribute) {
     const auto& collider = self.cast<const ColliderObject&>();
     const auto field = [&] {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         return (collider.*member)();
     };
     const py::object get = py::module_::import("builtins").attr("getattr");
@@ -108,7 +109,7 @@ FieldObject fieldOf(const py::object& self, const Field& (Collider::*member)() c
 }
 
 SharedMesh meshOfCollider(const Collider& collider) {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return std::make_shared<Mesh>(collider.mesh());
 }
 
@@ -193,7 +194,7 @@ void addCollider(py::module_& module) {
             "mass",
             [](const ColliderObject& self) {
                 const auto find = [&] {
-                    const py::gil_scoped_release release;
+                    const WithoutGil release;
                     return self.mass();
                 };
                 return toResult(find());

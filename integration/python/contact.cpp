@@ -15,6 +15,7 @@
 #include "integration/python/bindings.h"
 #include "integration/python/define.h"
 #include "integration/python/placed.h"
+#include "integration/python/without_gil.h"
 
 namespace bilayer::python {
 namespace {
@@ -48,7 +49,7 @@ py::object findContacts(const py::object& a, const py::object& poseA, const py::
     std::vector<Contact> contacts;
     ContactReport report;
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         std::unique_lock<std::mutex> lock;
         if (cache) lock = std::unique_lock(cache->mutex);
         report = collide(first, second, options, contacts, cache ? &cache->cache : nullptr);
@@ -108,7 +109,10 @@ True
 void addContact(py::module_& module) {
     py::class_<LockedCache> type(module, "ContactCache", cacheDoc);
     defineConstructor(type, cacheDoc, [] { return std::make_unique<LockedCache>(); });
-    type.def("__repr__", [](const py::object&) { return "ContactCache()"; });
+    type.def("__repr__", [](const py::object&) { return "ContactCache()"; })
+        .def("__reduce__", [](const py::object&) -> py::object {
+            throw py::type_error("a ContactCache cannot be copied or pickled: make one for each pair of bodies");
+        });
     define(module, collideDoc, findContacts);
 }
 

@@ -9,74 +9,50 @@
 #include <array>
 #include <cctype>
 #include <limits>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace bilayer::python {
 namespace {
 
-/// Options in errors of the libraries, and their names here.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 8> optionNames{
-    {{"voxelSize", "voxel_size"},
-     {"exteriorWidthVoxels", "exterior_width_voxels"},
-     {"interiorWidthVoxels", "interior_width_voxels"},
-     {"halfWidthVoxels", "half_width_voxels"},
-     {"gapVoxels", "gap_voxels"},
-     {"maxSubdivision", "max_subdivision"},
-     {"perVoxel", "per_voxel"},
-     {"give build() its filler", "device=\"opencl\""}}};
+/// What errors of the libraries are about that do not begin with an argument: the new one of two. Of functions without
+/// these arguments, the first one: the mesh of build().
+constexpr std::array<std::string_view, 2> defaultSubjects{"new_mesh", "body"};
 
-/// How errors of the libraries begin that do not name the argument, and the argument. Other errors are about the first
-/// one: the mesh of build(), the points of Shape.hull().
-constexpr std::array<std::pair<std::string_view, std::string_view>, 17> subjects{
-    {{"the resolution", "resolution"},
-     {"no voxel lies within the band", "half_width"},
-     {"a gap of", "gap_voxels"},
-     {"the method", "method"},
-     {"a margin", "margin"},
-     {"the radius of a sphere", "radii"},
-     {"the largest radius", "radii"},
-     {"the radius", "radius"},
-     {"the half height", "half_height"},
-     {"the offset", "offset"},
-     {"the mesh", "body"},
-     {"the body", "body"},
-     {"the field", "body"},
-     {"triangle", "moved"},
-     {"the motion", "motion_a, motion_b"},
-     {"a plane or a sheet", "motion_a, motion_b"},
-     {"at least one of the two shapes", "a"}}};
-
-/// What was called, before some errors of the libraries.
-constexpr std::string_view callers[] = {
-    "collider: ", "field: ", "mass properties: ", "particles: ", "seed: ", "solid: ", "surface points: "};
-
-bool isWord(char letter) {
-    return std::isalnum(static_cast<unsigned char>(letter)) || letter == '_';
-}
-
-// Whether a message begins with the name of a parameter. "a margin" does not begin with the parameter `a`.
-bool namesOneOf(const std::vector<std::string>& names, std::string_view message) {
-    for (const std::string& name : names) {
-        if (!message.starts_with(name)) continue;
-        const char next = message.size() > name.size() ? message[name.size()] : ':';
-        if (name.size() == 1 ? next == ':' : !isWord(next)) return true;
+// The name of an option in the libraries: "voxelSize" of "voxel_size".
+std::string inCamelCase(std::string_view name) {
+    std::string result;
+    for (std::size_t i = 0; i < name.size(); ++i) {
+        const bool begins = i > 0 && name[i - 1] == '_';
+        if (name[i] != '_') result += begins ? char(std::toupper(static_cast<unsigned char>(name[i]))) : name[i];
     }
-    return false;
+    return result;
 }
 
+// Whether a message begins with a word or words. "a margin" does not begin with the parameter `a`.
+bool beginsWith(std::string_view message, std::string_view words) {
+    if (!message.starts_with(words)) return false;
+    const char next = message.size() > words.size() ? message[words.size()] : ':';
+    return words.size() == 1 ? next == ':' : !std::isalnum(static_cast<unsigned char>(next)) && next != '_';
+}
+
+// Errors begin with the option that they are about, as in C++, or in words: "halfHeight", "the half height".
 std::string namedMessage(std::string message, const std::vector<std::string>& names) {
-    for (const auto& [name, here] : optionNames) {
-        const std::size_t at = message.find(name);
-        if (at != std::string::npos) message.replace(at, name.size(), here);
+    const std::string_view article = "the ";
+    const std::string said = message.starts_with(article) ? message.substr(article.size()) : message;
+    for (const std::string& name : names) {
+        if (beginsWith(message, name)) return message;
+        if (const std::string camel = inCamelCase(name); beginsWith(message, camel))
+            return name + message.substr(camel.size());
+        std::string words = name;
+        std::replace(words.begin(), words.end(), '_', ' ');
+        if (beginsWith(said, words)) return fmt::format("{}: {}", name, message);
     }
-    if (namesOneOf(names, message)) return message;
-    for (const std::string_view caller : callers)
-        if (message.starts_with(caller)) message.erase(0, caller.size());
-    if (namesOneOf(names, message)) return message;
-    for (const auto& [begin, subject] : subjects)
-        if (message.starts_with(begin) && namesOneOf(names, subject)) return fmt::format("{}: {}", subject, message);
-    const std::size_t first = !names.empty() && names[0] == "self" ? 1 : 0;
-    return first < names.size() ? fmt::format("{}: {}", names[first], message) : message;
+    for (const std::string_view subject : defaultSubjects)
+        if (std::find(names.begin(), names.end(), subject) != names.end())
+            return fmt::format("{}: {}", subject, message);
+    return names.empty() || names[0] == "self" ? message : fmt::format("{}: {}", names[0], message);
 }
 
 // "name(a, b=1)" of a docstring.

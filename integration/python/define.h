@@ -11,6 +11,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -137,6 +138,19 @@ void defineConstructorAs(py::class_<Class, Extra...>& type, const char* doc,
         }
         (std::index_sequence_for<Parameters...>());
     }));
+}
+
+/// How pickles, of all protocols, make an object again. pybind11's own way ends the process for protocols 0 and 1.
+/// @param doc     "_name(packed) -> Class": a static function for pickles alone
+/// @param unpack  makes the object from what `pack` returns of one
+template <class Class, class... Extra, class Unpack, class Pack>
+void defineReduce(py::class_<Class, Extra...>& type, const char* doc, Unpack unpack, Pack pack) {
+    defineStatic(type, doc, unpack);
+    const std::string name(doc, std::string_view(doc).find('('));
+    const py::object make = type.attr(name.c_str());
+    type.def("__reduce__", [make, pack](const Class& self) {
+        return py::make_tuple(make, py::make_tuple(pack(self)));
+    });
 }
 
 /// The constructor of a class, from a function that makes an object. The docstring is that of the class.

@@ -20,6 +20,7 @@
 
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
+#include "integration/python/without_gil.h"
 #include "sdf/base/openvdb.h"
 
 namespace bilayer::python {
@@ -259,15 +260,18 @@ py::object toDense(const LevelSet& levelSet, int padding) {
     if (padding < 0) throw std::invalid_argument(fmt::format("padding is {}, and must be 0 or above", padding));
     const FloatGrid& grid = *levelSet.grids().distance;
     CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    const openvdb::Vec3d padded = box.dim().asVec3d() + 2. * openvdb::Vec3d(padding);
+    if (padded.x() * padded.y() * padded.z() > maxDenseVoxels)
+        throw std::invalid_argument(
+            fmt::format("padding: a dense array of {} x {} x {} voxels is larger than 8 GiB: "
+                        "use sparse()",
+                        padded.x(), padded.y(), padded.z()));
     box.expand(padding);
     const Coord size = box.dim();
-    if (double(size.x()) * size.y() * size.z() > maxDenseVoxels)
-        throw std::invalid_argument(fmt::format(
-            "a dense array of {} x {} x {} voxels is larger than 8 GiB: use sparse()", size.x(), size.y(), size.z()));
     py::array_t<float> values({size.x(), size.y(), size.z()});
     float* const memory = values.mutable_data();
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         DenseFloats target(box, memory);
         openvdb::tools::copyToDense(grid, target);
     }
@@ -281,13 +285,13 @@ LevelSet fromDense(const py::object& array, const py::object& origin, double spa
     const Shape& shape = given.shape();
     if (shape.size() != 3 || std::find(shape.begin(), shape.end(), 0) != shape.end())
         throw std::invalid_argument("values: expected real numbers of shape (nx, ny, nz), got shape " + text(shape));
-    requirePositive(spacing, "spacing");
+    requireVoxelSize(spacing, "spacing");
     const glm::dvec3 reference = doubleVector(fieldOrigin, "field_origin");
     const Coord shift = shiftOf(doubleVector(origin, "origin"), spacing);
     const DenseValues values(given.as<float>(), shape, spacing);
     float minAtBorder = 0, min = 0;
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         min = values.min();
         minAtBorder = values.minAtBorder();
         if (!(min < 0)) throw std::invalid_argument("values: expected negative distances inside, got none");
@@ -300,7 +304,7 @@ LevelSet fromDense(const py::object& array, const py::object& origin, double spa
         values.requireStepsAtSurface();
     }
     const Widths widths = widthsOf(halfWidth, minAtBorder, -min, spacing);
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     openvdb::initialize();
     const CoordBBox box(shift, shift + values.size() - Coord(1));
     return levelSetOf(gridOf(given.as<float>(), box, widths), widths, spacing, reference);

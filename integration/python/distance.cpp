@@ -14,6 +14,7 @@
 #include "integration/python/cancellable.h"
 #include "integration/python/define.h"
 #include "integration/python/placed.h"
+#include "integration/python/without_gil.h"
 
 namespace bilayer::python {
 namespace {
@@ -56,7 +57,7 @@ py::object findDistance(const py::object& a, const py::object& poseA, const py::
     const DistanceOptions options = reachOf(maxDistance);
     BodyDistance answer;
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         answer = distance(first, second, options);
     }
     return toResult(answer);
@@ -71,7 +72,7 @@ py::object findImpact(const py::object& a, const py::object& poseA, const py::ob
         throw std::invalid_argument(fmt::format("tolerance is {}, and must be 0 with penetration=True", tolerance));
     Impact impact;
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         impact = timeOfImpact(first, second, {.tolerance = tolerance, .penetration = penetration});
     }
     return result("Impact", impact.found, impact.fraction, impact.poseA, impact.poseB, toResult(impact.distance));

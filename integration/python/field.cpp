@@ -16,6 +16,7 @@
 #include "integration/python/define.h"
 #include "integration/python/field_docs.h"
 #include "integration/python/objects.h"
+#include "integration/python/without_gil.h"
 #include "sdf/base/unit_tolerance.h"
 
 namespace bilayer::python {
@@ -197,7 +198,7 @@ FieldObject makeField(const py::object& levelSet, const py::object& mesh, const 
     const FieldOptions options{byWord(storages, storage, "storage")};
     const SharedMesh shared = mesh.is_none() ? nullptr : meshOf(mesh, "mesh");
     const auto make = [&] {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         return shared ? Field(distances, *shared, options) : Field(distances, options);
     };
     FieldObject field{make(), py::tuple(), distances.origin()};
@@ -218,7 +219,7 @@ py::object meshOfField(const FieldObject& field) {
     if (!mesh) return py::none();
     SharedMesh copy;
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         copy = std::make_shared<Mesh>(*mesh);
     }
     return py::cast(copy);

@@ -21,6 +21,7 @@
 #include "integration/python/define.h"
 #include "integration/python/grid_bytes.h"
 #include "integration/python/objects.h"
+#include "integration/python/without_gil.h"
 #include "sdf/base/openvdb.h"
 
 namespace bilayer::python {
@@ -80,6 +81,7 @@ py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::
         dropHistory(*grid);
         return solid.visit([&](const auto& one) { return fluid::seed(*grid, one, placement, options); });
     });
+    if (grid->activeVoxelCount() == 0) throw std::invalid_argument("body: it leaves nothing of the liquid");
     auto grids = std::make_shared<Grids>();
     grids->distance = grid;
     return result("Seeded", LevelSet(std::move(grids)), maxChange, toArray(where), changedVoxels);
@@ -90,14 +92,15 @@ py::object makeParticles(const py::object& liquid, const py::object& pose, const
     fluid::ParticleOptions options{.perVoxel = perVoxel, .seed = seed};
     std::function<fluid::Particles()> make;
     if (py::isinstance<LevelSet>(liquid)) {
-        if (!pose.is_none() || voxelSize)
-            throw std::invalid_argument("pose, voxel_size: expected None with a LevelSet, which has its own voxels");
+        if (!pose.is_none() || voxelSize || placementOf(pose, scale).scale != glm::vec3(1))
+            throw std::invalid_argument(
+                "pose, scale, voxel_size: expected no values with a LevelSet, which has its own voxels: pass a Field");
         const auto& levelSet = liquid.cast<const LevelSet&>();
         make = [&] { return fluid::particles(*levelSet.grids().distance, options); };
     } else if (py::isinstance<FieldObject>(liquid)) {
         const auto& field = liquid.cast<const FieldObject&>();
         const double edge = voxelSize.value_or(double(field.voxelSize()));
-        requirePositive(edge, "voxel_size");
+        requireVoxelSize(edge, "voxel_size");
         make = [&options, &field, placement = placementOf(pose, scale), edge] {
             return fluid::particles(field, placement, *Transform::createLinearTransform(edge), options);
         };
@@ -141,7 +144,7 @@ class Obstacle {
         py::array_t<float> values(shape);
         auto* const memory = reinterpret_cast<Value*>(values.mutable_data());
         {
-            const py::gil_scoped_release release;
+            const WithoutGil release;
             openvdb::tools::Dense<Value, openvdb::tools::LayoutZYX> target(box_, memory);
             openvdb::tools::copyToDense(grid, target);
         }
@@ -149,7 +152,8 @@ class Obstacle {
     }
 
     void save(const Path& path) const {
-        const py::gil_scoped_release release;
+        requireExtension(path, {".vdb"});
+        const WithoutGil release;
         writeGrids(path.text, grids());
     }
     std::string text() const {
@@ -164,7 +168,7 @@ class Obstacle {
 
 Obstacle makeObstacle(const py::object& solid, double voxelSize, const py::object& pose, const py::object& scale,
                       const py::object& velocity, const py::object& angularVelocity, float halfWidth) {
-    requirePositive(voxelSize, "voxel_size");
+    requireVoxelSize(voxelSize, "voxel_size");
     const fluid::Placement placement = placementOf(pose, scale);
     fluid::SolidOptions options{.velocity = {vector(velocity, "velocity"), vector(angularVelocity, "angular_velocity")},
                                 .halfWidthVoxels = halfWidth};
@@ -179,7 +183,7 @@ Obstacle makeObstacle(const py::object& solid, double voxelSize, const py::objec
 }
 
 // The obstacle of grids in the order of Obstacle::grids().
-Obstacle restored(const py::bytes& bytes) {
+Obstacle unpacked(const py::object& bytes) {
     const openvdb::GridPtrVec grids = gridsOf(bytes);
     if (grids.size() != 4) throw std::invalid_argument("an obstacle has 4 grids");
     return Obstacle(
@@ -196,7 +200,8 @@ liquid: a LevelSet with a band of 3 voxels or more on each side.
 body: a mesh or a LevelSet. pose: a Pose, a matrix of shape (4, 4), or None. scale: one number or three, above 0.
 mode: "unite", "intersect" or "subtract". unite_solids: ignore walls inside overlapping solids of the mesh.
 
-Raises ValueError for a body that is open or without an inside, and for a liquid that is no level set.
+Raises ValueError for a body that is open or without an inside, for a liquid that is no level set, and if nothing of the
+liquid is left.
 
 >>> import bilayer
 >>> tank = bilayer.build(bilayer.box((2, 2, 1)), voxel_size=0.05)
@@ -245,7 +250,9 @@ Raises ValueError for a body that is open or without an inside.
 
 constexpr const char* saveDoc = R"(save(path)
 
-Writes the four grids to a .vdb file, whole or not at all. Raises RuntimeError if it cannot be written.
+Writes the four grids to a .vdb file, whole or not at all.
+
+Raises ValueError for another extension, and RuntimeError if the file cannot be written.
 
 >>> import bilayer, os, tempfile
 >>> with tempfile.TemporaryDirectory() as folder:
@@ -278,8 +285,9 @@ void addFluid(py::module_& module) {
         .def("__repr__", &Obstacle::text)
         .def("__copy__", [](const Obstacle& self) { return self; })
         .def(
-            "__deepcopy__", [](const Obstacle& self, const py::dict&) { return self; }, py::arg("memo"))
-        .def(py::pickle([](const Obstacle& self) { return bytesOf(self.grids()); }, &restored));
+            "__deepcopy__", [](const Obstacle& self, const py::dict&) { return self; }, py::arg("memo"));
+    defineReduce(type, "_unpacked(packed) -> Obstacle", unpacked,
+                 [](const Obstacle& self) { return bytesOf(self.grids()); });
     define(module, seedDoc, seedLiquid);
     define(module, particlesDoc, makeParticles);
     define(module, obstacleDoc, makeObstacle);

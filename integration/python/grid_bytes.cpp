@@ -7,6 +7,7 @@
 #include <sstream>
 #include <string>
 
+#include "integration/python/without_gil.h"
 #include "sdf/base/openvdb.h"
 
 namespace bilayer::python {
@@ -14,7 +15,7 @@ namespace bilayer::python {
 py::bytes bytesOf(const openvdb::GridCPtrVec& grids) {
     std::string bytes;
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         openvdb::initialize();
         std::ostringstream stream(std::ios::binary);
         openvdb::io::Stream(stream).write(grids);
@@ -25,7 +26,7 @@ py::bytes bytesOf(const openvdb::GridCPtrVec& grids) {
 
 openvdb::GridPtrVec gridsOf(const py::bytes& bytes) {
     const auto view = bytes.cast<std::string>();
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     openvdb::initialize();
     std::istringstream stream(view, std::ios::binary);
     return *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();

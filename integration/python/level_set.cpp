@@ -5,6 +5,7 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -22,6 +23,7 @@
 #include "integration/python/define.h"
 #include "integration/python/dense.h"
 #include "integration/python/grid_bytes.h"
+#include "integration/python/without_gil.h"
 #include "sdf/base/openvdb.h"
 
 namespace bilayer::python {
@@ -78,7 +80,7 @@ py::array arrayOf(std::vector<Value> values, const Shape& shape) {
 py::object sparse(const LevelSet& levelSet) {
     ActiveVoxels voxels;
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         voxels = activeVoxels(levelSet);
     }
     const auto count = py::ssize_t(voxels.values.size());
@@ -117,7 +119,7 @@ py::bytes packed(const LevelSet& levelSet) {
     return bytesOf(all);
 }
 
-LevelSet unpacked(const py::bytes& packed) {
+LevelSet unpacked(const py::object& packed) {
     const openvdb::GridPtrVec all = gridsOf(packed);
     auto grids = std::make_shared<Grids>();
     for (const auto& grid : all) {
@@ -128,7 +130,7 @@ LevelSet unpacked(const py::bytes& packed) {
         else
             grids->distance = openvdb::gridPtrCast<FloatGrid>(grid);
     }
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return LevelSet(std::move(grids));
 }
 
@@ -144,28 +146,27 @@ bool equal(const LevelSet& a, const LevelSet& b) {
 }
 
 void save(const LevelSet& levelSet, const Path& path, bool halfFloat) {
+    requireExtension(path, {".vdb", ".nvdb"});
     const std::string& file = path.text;
-    const bool nano = file.ends_with(".nvdb");
-    if (!nano && !file.ends_with(".vdb"))
-        throw std::invalid_argument(fmt::format("path: expected a name that ends in .vdb or .nvdb, got '{}'", file));
+    const bool nano = std::tolower(file[file.size() - 4]) == 'n';
     if (nano && halfFloat) throw std::invalid_argument("half_float: .nvdb files hold 32-bit floats");
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     nano ? writeNanoVdb(file, levelSet) : writeVdb(file, levelSet, {.halfFloat = halfFloat});
 }
 
 LevelSet load(const Path& path) {
     requireExisting(path);
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return readVdb(path.text);
 }
 
 SharedMesh extract(const LevelSet& levelSet, float isovalue, float adaptivity) {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return std::make_shared<Mesh>(surface(levelSet, {isovalue, adaptivity}));
 }
 
 LevelSet extended(const LevelSet& levelSet, std::optional<float> distance) {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return distance ? fluid::extend(levelSet, *distance) : fluid::extend(levelSet);
 }
 
@@ -328,7 +329,7 @@ void addLevelSet(py::module_& module) {
         .def(
             "__eq__",
             [](const LevelSet& a, const LevelSet& b) {
-                const py::gil_scoped_release release;
+                const WithoutGil release;
                 return equal(a, b);
             },
             py::is_operator())
@@ -336,11 +337,10 @@ void addLevelSet(py::module_& module) {
         .def("__copy__", [](const LevelSet& self) { return self; })
         .def(
             "__deepcopy__", [](const LevelSet& self, const py::dict&) { return self; }, py::arg("memo"))
-        .def("__repr__",
-             [](const LevelSet& self) {
-                 return fmt::format("LevelSet({} active voxels of {:g})", self.activeVoxels(), self.voxelSize());
-             })
-        .def(py::pickle(&packed, &unpacked));
+        .def("__repr__", [](const LevelSet& self) {
+            return fmt::format("LevelSet({} active voxels of {:g})", self.activeVoxels(), self.voxelSize());
+        });
+    defineReduce(type, "_unpacked(packed) -> LevelSet", unpacked, packed);
 }
 
 }  // namespace bilayer::python

@@ -15,6 +15,7 @@
 #include "integration/python/bindings.h"
 #include "integration/python/cancellable.h"
 #include "integration/python/define.h"
+#include "integration/python/without_gil.h"
 
 namespace bilayer::python {
 namespace {
@@ -49,7 +50,7 @@ SharedMesh makeMesh(const py::object& vertices, const py::object& faces, const p
     const std::vector<std::uint32_t> corners = indices(faces, "faces", 3, span.size(), "a vertex");
     const auto mesh = std::make_shared<Mesh>();
     if (!origin.is_none()) mesh->origin = doubleVector(origin, "origin");
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     mesh->points.assign(span.begin(), span.end());
     mesh->triangles.resize(corners.size() / 3);
     if (!corners.empty()) std::memcpy(mesh->triangles.data(), corners.data(), corners.size() * sizeof(std::uint32_t));
@@ -57,7 +58,7 @@ SharedMesh makeMesh(const py::object& vertices, const py::object& faces, const p
 }
 
 bool equal(const Mesh& a, const Mesh& b) {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return a.points == b.points && a.triangles == b.triangles && a.origin == b.origin;
 }
 
@@ -69,7 +70,7 @@ SharedMesh transform(const Mesh& mesh, const py::object& matrix) {
     glm::mat4 map;
     for (int row = 0; row < 4; ++row)
         for (int column = 0; column < 4; ++column) map[column][row] = values[std::size_t(4 * row + column)];
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return std::make_shared<Mesh>(transformed(mesh, map));
 }
 
@@ -109,17 +110,18 @@ py::object inspectMesh(const SharedMesh& mesh, float wall) {
 
 SharedMesh read(const Path& path) {
     requireExisting(path);
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return std::make_shared<Mesh>(readMesh(path.text));
 }
 
 void write(const Mesh& mesh, const Path& path) {
-    const py::gil_scoped_release release;
+    requireExtension(path, {".obj", ".ply", ".stl"});
+    const WithoutGil release;
     writeMesh(path.text, mesh);
 }
 
 SharedMesh weldedMesh(const Mesh& mesh) {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return std::make_shared<Mesh>(weld(mesh));
 }
 
@@ -234,7 +236,7 @@ void addMesh(py::module_& module) {
             "bounds",
             [](const Mesh& mesh) {
                 const auto find = [&] {
-                    const py::gil_scoped_release release;
+                    const WithoutGil release;
                     return bounds(mesh);
                 };
                 return toArray(find());
@@ -244,7 +246,7 @@ void addMesh(py::module_& module) {
             "__eq__", [](const Mesh& a, const Mesh& b) { return equal(a, b); }, py::is_operator())
         .def("__hash__",
              [](const Mesh& mesh) {
-                 const py::gil_scoped_release release;
+                 const WithoutGil release;
                  return py::ssize_t(hash(mesh) >> 1);
              })
         .def("__copy__", [](const py::object& self) { return self; })

@@ -13,6 +13,7 @@
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
 #include "integration/python/define.h"
+#include "integration/python/without_gil.h"
 #include "sdf/base/unit_tolerance.h"
 
 namespace bilayer::python {
@@ -74,18 +75,17 @@ py::object mapped(const py::object& object, Map map) {
     py::array_t<float> result(shape);
     auto* to = reinterpret_cast<glm::vec3*>(result.mutable_data());
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         for (const glm::vec3& point : points.points()) *to++ = map(point);
     }
     return result;
 }
 
 // Restores a pose to the bit, without the normalization of a new one.
-Pose restored(const py::tuple& state) {
-    const glm::vec3 place = vector(state[0], "position");
-    const Floats q(state[1], "rotation", {4});
-    const auto n = q.as<float>();
-    return {place, glm::quat(n[0], n[1], n[2], n[3])};
+Pose unpacked(const py::object& packed) {
+    const Floats numbers(packed, "packed", {7}, Range::finite, Items::one);
+    const auto n = numbers.as<float>();
+    return {{n[0], n[1], n[2]}, glm::quat(n[3], n[4], n[5], n[6])};
 }
 
 constexpr const char* poseDoc = R"(Pose(position=(0, 0, 0), rotation=(1, 0, 0, 0))
@@ -172,15 +172,16 @@ void addPose(py::module_& module) {
         .def("__copy__", [](const Pose& self) { return self; })
         .def(
             "__deepcopy__", [](const Pose& self, const py::dict&) { return self; }, py::arg("memo"))
-        .def("__repr__",
-             [](const Pose& pose) {
-                 const glm::vec3& p = pose.position;
-                 const glm::quat& q = pose.rotation;
-                 return fmt::format("Pose(({:g}, {:g}, {:g}), ({:g}, {:g}, {:g}, {:g}))", p.x, p.y, p.z, q.w, q.x, q.y,
-                                    q.z);
-             })
-        .def(py::pickle([](const Pose& pose) { return py::make_tuple(toArray(pose.position), rotationOf(pose)); },
-                        &restored));
+        .def("__repr__", [](const Pose& pose) {
+            const glm::vec3& p = pose.position;
+            const glm::quat& q = pose.rotation;
+            return fmt::format("Pose(({}, {}, {}), ({}, {}, {}, {}))", p.x, p.y, p.z, q.w, q.x, q.y, q.z);
+        });
+    defineReduce(type, "_unpacked(packed) -> Pose", unpacked, [](const Pose& pose) {
+        const glm::vec3& p = pose.position;
+        const glm::quat& q = pose.rotation;
+        return py::make_tuple(p.x, p.y, p.z, q.w, q.x, q.y, q.z);
+    });
 }
 
 }  // namespace bilayer::python

@@ -15,6 +15,7 @@
 #include "integration/python/bindings.h"
 #include "integration/python/define.h"
 #include "integration/python/objects.h"
+#include "integration/python/without_gil.h"
 
 namespace bilayer::python {
 namespace {
@@ -35,7 +36,7 @@ py::tuple recipeOf(const ShapeObject& shape) {
 // Makes a shape without the GIL.
 template <class Make>
 ContactShape withoutGil(const Make& make) {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     return make();
 }
 
@@ -91,7 +92,7 @@ bool meets(const Bounds& box, const Bounds& other) {
 
 ShapeObject makeTriangles(const SharedMesh& shared) {
     {
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         validate(*shared);
     }
     const TriangleSheet sheet{[shared](const Bounds& box, const TriangleSheet::Visitor& visitor) {

@@ -74,7 +74,7 @@ void checkMoved(const Mesh& before, const Mesh& after, std::span<const std::uint
         },
         [](std::size_t a, std::size_t b) { return std::min(a, b); });
     if (first < count)
-        throw std::invalid_argument(fmt::format("triangle {} has other corners now, but is not in moved", first));
+        throw std::invalid_argument(fmt::format("moved lacks triangle {}, which has other corners now", first));
 }
 
 DirtyRegion::DirtyRegion(const Mesh& before, const Mesh& after, std::span<const std::uint32_t> moved,

@@ -222,7 +222,7 @@ void FieldFiller::trim() {
 
 LevelSet FieldFiller::levelSet() {
     if (distance_->empty() || distance_->activeVoxelCount() == 0)
-        throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
+        throw std::invalid_argument("the half width is too small for this voxel size: no voxel lies within the band");
     progress_.poll();
     return LevelSet(grids());
 }

@@ -34,7 +34,7 @@ void describe(openvdb::FloatGrid& grid, const glm::dvec3& origin, std::uint64_t 
 }
 
 void checkFieldOf(const LevelSet& field, const Mesh& mesh, const BuildOptions& options) {
-    const auto refuse = [](const std::string& why) { throw std::invalid_argument("the old field " + why); };
+    const auto refuse = [](const std::string& why) { throw std::invalid_argument("the level set " + why); };
     const BandWidths widths = bandOf(options);
     if (field.voxelSize() != options.voxelSize) refuse(fmt::format("has voxels of {:g}", field.voxelSize()));
     if (field.exteriorWidth() != widths.exterior * widths.voxelSize ||

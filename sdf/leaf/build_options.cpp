@@ -28,7 +28,7 @@ void require(bool condition, const char* option, const char* range, double value
 }
 
 void checkWidth(const char* option, float voxels, float voxelSize) {
-    require(voxels > 0 && voxels <= 1000, option, "in (0, 1000] voxels", voxels);
+    require(voxels > 0 && voxels <= maxWidthVoxels, option, "in (0, 1000] voxels", voxels);
     // Background of the field [m].
     const float width = voxels * voxelSize;
     require(std::isnormal(width), option, "a width that floats can hold", width);
@@ -36,21 +36,21 @@ void checkWidth(const char* option, float voxels, float voxelSize) {
 
 }  // namespace
 
-void checkVoxelSize(float voxelSize) {
+void checkVoxelSize(float voxelSize, const char* option) {
     double scale = unitStep;
     if (double(voxelSize) > maxStoredVoxel) {
         while (double(voxelSize) / scale > maxStoredVoxel) scale *= unitStep;
         throw std::invalid_argument(
-            fmt::format("voxelSize {:g} is above {:g}, the largest that a field may have: scale the mesh by {:g}, so "
+            fmt::format("{} {:g} is above {:g}, the largest that a field may have: scale the mesh by {:g}, so "
                         "that voxels are {:g}",
-                        voxelSize, maxStoredVoxel, 1 / scale, double(voxelSize) / scale));
+                        option, voxelSize, maxStoredVoxel, 1 / scale, double(voxelSize) / scale));
     }
     if (voxelSize >= minVoxelSize) return;
     while (scale * double(voxelSize) < double(minVoxelSize)) scale *= unitStep;
     throw std::invalid_argument(
-        fmt::format("voxelSize {:g} is below {:g}, the smallest that OpenVDB takes: scale the mesh by {:g}{}, so that "
+        fmt::format("{} {:g} is below {:g}, the smallest that OpenVDB takes: scale the mesh by {:g}{}, so that "
                     "voxels are {:g}",
-                    voxelSize, minVoxelSize, scale, scale == unitStep ? " (from metres to millimetres)" : "",
+                    option, voxelSize, minVoxelSize, scale, scale == unitStep ? " (from metres to millimetres)" : "",
                     scale * double(voxelSize)));
 }
 

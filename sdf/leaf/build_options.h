@@ -12,8 +12,12 @@ namespace bilayer::detail {
 /// OpenVDB treats a transform with a determinant below 3e-15 as singular [m].
 inline constexpr float minVoxelSize = 2e-5f;
 
-/// Throws std::invalid_argument for voxels that fields may not have; the text names the scale that helps.
-void checkVoxelSize(float voxelSize);
+/// Maximum width of the band on either side [voxels].
+inline constexpr float maxWidthVoxels = 1000;
+
+/// Throws std::invalid_argument for voxels that fields may not have; the text names the option and the scale that
+/// helps.
+void checkVoxelSize(float voxelSize, const char* option = "voxelSize");
 
 /// Throws std::invalid_argument that names an option out of range.
 void checkOptions(const BuildOptions& options);

@@ -274,9 +274,9 @@ void Flood::settleRest() {
 
 void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths, Progress* progress) {
     const float reach = 0.5f * gap + 1;
-    if (!(gap >= 0)) throw std::invalid_argument(fmt::format("gap must be at least 0 voxels, not {}", gap));
+    if (!(gap >= 0)) throw std::invalid_argument(fmt::format("gapVoxels must be at least 0, not {}", gap));
     if (grid.background() < (reach - distanceSlack) * widths.voxelSize)
-        throw std::invalid_argument(fmt::format("a gap of {} voxels needs distances up to {} voxels", gap, reach));
+        throw std::invalid_argument(fmt::format("gapVoxels {} needs distances up to {} voxels", gap, reach));
     validate(mesh);
     const float background = grid.background();
     const std::vector<BandLeaf*> leaves = leavesOf(grid);

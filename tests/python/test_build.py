@@ -57,11 +57,11 @@ def test_signs(box, sign):
         ({"voxel_size": 1e-9}, ValueError, "voxel_size 1e-09 is below"),
         ({"resolution": float("inf")}, ValueError, "resolution is inf"),
         ({"resolution": 8, "half_width": 1e9}, ValueError, "half_width is 1e[+]09 .* voxels"),
-        ({"resolution": 8, "half_width_voxels": 2000}, ValueError, "exterior_width_voxels must be in"),
+        ({"resolution": 8, "half_width_voxels": 2000}, ValueError, "half_width_voxels is 2000, .* at most 1000"),
         ({"resolution": 8, "half_width": 1, "half_width_voxels": 3}, ValueError, "only one of half_width"),
         ({"resolution": 8, "half_width": 1, "exterior_width_voxels": 3}, ValueError, "only one of half_width"),
         ({"resolution": 8, "method": "best"}, ValueError, "method: expected one of 'exact'.*got 'best'"),
-        ({"resolution": 8, "method": "prism"}, ValueError, 'method: the method prism needs an .*: device="opencl"'),
+        ({"resolution": 8, "method": "prism"}, ValueError, 'method: .* OpenCL device: device="opencl"'),
         ({"resolution": 8, "sign": "plus"}, ValueError, "sign: expected one of 'auto'"),
         ({"resolution": 8, "gap_voxels": 101}, ValueError, "gap_voxels must be in"),
         ({"resolution": 8, "delta": 9, "method": "double-layer"}, ValueError, "delta"),
@@ -185,7 +185,7 @@ def test_rebuild(sphere):
         bilayer.rebuild(old, sphere, new, faces[1:], voxel_size=0.05)
     with pytest.raises(ValueError, match=r"moved\[0\] is 99999"):
         bilayer.rebuild(old, sphere, new, [99999], voxel_size=0.05)
-    with pytest.raises(ValueError, match="level_set: the old field has voxels of 0.05"):
+    with pytest.raises(ValueError, match="level_set: the level set has voxels of 0.05"):
         bilayer.rebuild(old, sphere, new, faces, voxel_size=0.06)
     with pytest.raises(ValueError, match="another mesh"):
         bilayer.rebuild(old, new, sphere, faces, voxel_size=0.05)
@@ -200,3 +200,41 @@ def test_opencl(sphere):
     here, there = (bilayer.build(sphere, resolution=32, device=device) for device in ("cpu", "opencl"))
     assert np.array_equal(here.sparse().coordinates, there.sparse().coordinates)
     assert np.abs(here.sparse().values - there.sparse().values).max() <= 1e-5 * here.voxel_size
+
+
+def bent(mesh, by):
+    vertices = mesh.vertices.copy()
+    vertices[vertices[:, 2] > 0.6, 0] += by
+    return bilayer.Mesh(vertices, mesh.faces)
+
+
+def test_rebuild_frame_by_frame(sphere):
+    frames = [bent(sphere, 0.02 * number) for number in range(5)]
+    level_set = bilayer.build(frames[0], resolution=32)
+    for old, new in zip(frames, frames[1:]):
+        level_set = bilayer.rebuild(level_set, old, new)
+        assert level_set == bilayer.build(new, voxel_size=level_set.voxel_size)
+    with pytest.raises(ValueError, match="voxel_size, resolution: expected at most one"):
+        bilayer.rebuild(level_set, frames[-1], sphere, resolution=32, voxel_size=0.1)
+
+
+def test_rebuild_names_the_wrong_mesh(sphere, box):
+    level_set = bilayer.build(sphere, voxel_size=0.1)
+    flat = bilayer.Mesh(0 * sphere.vertices, sphere.faces)
+    wrong = (np.full_like(sphere.vertices, np.nan), sphere.faces)
+    for old, new, message in [
+        (sphere, box, "new_mesh: the mesh had"),
+        (sphere, flat, "new_mesh: the mesh has no triangle with an area"),
+        (sphere, wrong, r"new_mesh: vertices\[0, 0\] is nan"),
+        (wrong, sphere, r"old_mesh: vertices\[0, 0\] is nan"),
+        (box, sphere, "level_set: the level set is of another mesh"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            bilayer.rebuild(level_set, old, new)
+    with pytest.raises(ValueError, match="moved lacks triangle"):
+        bilayer.rebuild(level_set, sphere, bent(sphere, 0.1), [])
+
+
+def test_the_last_report_also_cancels(box):
+    with pytest.raises(bilayer.Cancelled):
+        bilayer.build(box, resolution=8, progress=lambda done: done < 1)

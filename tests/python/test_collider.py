@@ -79,7 +79,7 @@ def test_collider(box, box_set, collider, sphere):
     ):
         with pytest.raises(ValueError, match=message):
             bilayer.Collider(box, box_set, **options)
-    with pytest.raises(ValueError, match="mesh: the level set is of another mesh"):
+    with pytest.raises(ValueError, match="level_set: the level set is of another mesh"):
         bilayer.Collider(sphere, box_set)
     for swapped, call in (
         (lambda: bilayer.Collider(box_set, box), r"Collider\(mesh, level_set\)"),
@@ -313,7 +313,7 @@ def test_bad_shapes(collider):
     for make, message in (
         (lambda: bilayer.Shape.sphere(0), "radius: the radius is 0"),
         (lambda: bilayer.Shape.cone(1, -1), "half_height: the half height is -1"),
-        (lambda: bilayer.Shape.spheres([(0, 0, 0)], 0), "radii: the largest radius is 0"),
+        (lambda: bilayer.Shape.spheres([(0, 0, 0)], 0), "radii: the radii are all 0"),
         (lambda: bilayer.Shape.spheres([(0, 0, 0)], -1), "radii is -1"),
         (lambda: bilayer.Shape.plane((0, 0, 1), np.inf), "offset: the offset of the plane is not finite"),
         (lambda: bilayer.Shape.triangles(bilayer.Mesh(np.zeros((0, 3)), [])), "mesh: the mesh has no triangle"),

@@ -56,6 +56,17 @@ def test_bad_seeds(tank):
         bilayer.seed(narrow, ball)
 
 
+def test_nothing_left(tank):
+    with pytest.raises(ValueError, match="body: it leaves nothing of the liquid"):
+        bilayer.seed(tank, bilayer.box((99, 99, 99)), mode="subtract")
+
+
+def test_particles_of_a_level_set_take_no_place(tank):
+    for options in ({"scale": 2}, {"pose": bilayer.Pose((1, 0, 0))}, {"voxel_size": 1}):
+        with pytest.raises(ValueError, match="pose, scale, voxel_size: expected no values with a LevelSet"):
+            bilayer.particles(tank, **options)
+
+
 def test_particles(tank):
     points = bilayer.particles(tank, per_voxel=4)
     assert points.dtype == np.float32 and points.shape[1] == 3
@@ -69,7 +80,7 @@ def test_particles(tank):
     assert np.linalg.norm(moved - [5, 0, 0], axis=1).max() <= 0.6 + 1e-5
     for arguments, message in (
         ({"per_voxel": 0}, "per_voxel must be in 1..1000"),
-        ({"pose": bilayer.Pose()}, "pose, voxel_size: expected None"),
+        ({"pose": bilayer.Pose()}, "pose, scale, voxel_size: expected no values"),
         ({"seed": -1}, "seed is -1, and must be an integer from 0 to 18446744073709551615"),
         ({"seed": 1.5}, "seed: expected an integer, got a 'float'"),
     ):

@@ -2,6 +2,7 @@
 """LevelSet: files, conversions, values."""
 
 import copy
+import os
 import pickle
 
 import numpy as np
@@ -229,3 +230,34 @@ def test_files_with_other_grids(tmp_path, box_set, kind):
     openvdb.write(both, grids=[empty])
     with pytest.raises(RuntimeError, match="holds no level set"):
         bilayer.LevelSet.load(both)
+
+
+@pytest.mark.parametrize("padding", [10**5, 2**30, 2**31 - 1])
+def test_too_much_padding(box_set, padding):
+    with pytest.raises(ValueError, match="padding: a dense array of .* is larger than 8 GiB"):
+        box_set.to_numpy(padding)
+
+
+@pytest.mark.parametrize("name", ["ü €.vdb", b"\xff.vdb", "CAPITALS.VDB"])
+def test_names_of_files(tmp_path, box, box_set, name):
+    path = os.path.join(os.fsencode(tmp_path), os.fsencode(name))
+    box_set.save(path)
+    assert os.path.exists(path) and bilayer.LevelSet.load(path) == box_set
+    mesh = path[:-4] + b".ply"
+    box.save(mesh)
+    assert os.path.exists(mesh) and bilayer.read_mesh(mesh) == box
+
+
+def test_a_null_byte_in_a_path(tmp_path, box_set):
+    for name in ("a\0b.vdb", b"a\0.vdb"):
+        with pytest.raises(ValueError, match="path: expected a path without null bytes"):
+            box_set.save(name)
+
+
+@pytest.mark.parametrize("spacing", [1e-30, 1e30])
+def test_voxels_beyond_the_limits_are_named(spacing):
+    with pytest.raises(ValueError, match="spacing 1e"):
+        bilayer.LevelSet.from_numpy([[[1.0]]], spacing=spacing)
+    for call in (bilayer.build, bilayer.obstacle):
+        with pytest.raises(ValueError, match="voxel_size 1e"):
+            call(bilayer.box(), voxel_size=spacing)

@@ -2,7 +2,10 @@
 """Threads, memory, and objects that outlive each other."""
 
 import gc
+import multiprocessing
 import pickle
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -144,3 +147,49 @@ def test_memory_does_not_grow(box):
         work()
     gc.collect()
     assert resident_bytes() - before < 8 << 20
+
+
+@pytest.mark.parametrize(
+    "call", ["bilayer.build(mesh, resolution=200)", "field.closest(points)", "level_set.surface()"]
+)
+def test_daemon_threads_end_with_the_process(call):
+    script = f"""
+import threading, time
+import numpy as np
+import bilayer
+mesh = bilayer.sphere(1, 5)
+level_set = bilayer.build(mesh, resolution=64)
+field = bilayer.Field(level_set, mesh)
+points = np.random.default_rng(0).uniform(-2, 2, (300000, 3)).astype(np.float32)
+def work():
+    while True:
+        {call}
+for _ in range(3):
+    threading.Thread(target=work, daemon=True).start()
+time.sleep(0.3)
+"""
+    for _ in range(3):
+        result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+        assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_forked_processes_answer(sphere, sphere_field, random):
+    points = random.uniform(-2, 2, size=(5000, 3))
+    expected = sphere_field.closest(points).distance
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        answers = pool.map_async(sphere_field.closest, [points] * 8).get(timeout=120)
+    assert all(np.array_equal(answer.distance, expected) for answer in answers)
+
+
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_all_values_pickle(protocol, box, box_set, box_field, collider):
+    pose = bilayer.Pose((0, 0, 1.99), (0.6, 0, 0, 0.8))
+    obstacle = bilayer.obstacle(box, 0.5)
+    values = [box, box_set, box_field, collider, pose, obstacle, bilayer.Shape.hull(box.vertices)]
+    values += [bilayer.inspect(box), box_set.to_numpy(), bilayer.collide(collider, pose, collider, None)]
+    again = pickle.loads(pickle.dumps(values, protocol))
+    assert [type(value) for value in again] == [type(value) for value in values]
+    assert again[0] == box and again[1] == box_set and again[4] == pose
+    assert np.array_equal(again[5].velocity, obstacle.velocity)
+    with pytest.raises(TypeError, match="a ContactCache cannot be copied or pickled"):
+        pickle.dumps(bilayer.ContactCache(), protocol)

@@ -213,7 +213,8 @@ class TileRun {
         for (std::size_t tile = 0; tile < tiling.size(); ++tile)
             records.push_back(readJson(folder_.record(tiling.place(tile))));
         if (std::all_of(records.begin(), records.end(), [](const Json& r) { return r.at("file").is_null(); }))
-            throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
+            throw std::invalid_argument(
+                "the half width is too small for this voxel size: no voxel lies within the band");
         joinSides(records, counts_);
         writeJson(folder_.manifest(), plan.manifest(records, ranks_.count));
         folder_.clean();

@@ -51,7 +51,10 @@ def mesh_of(source: Any, name: str) -> Mesh:
         raise ValueError(f"{name}: {error}") from error
     if arrays is None:
         raise ValueError(f"{name}: expected {_ACCEPTED}, got a '{_type(source)}'")
-    return Mesh(*arrays)
+    try:
+        return Mesh(*arrays)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def _arrays(source: Any) -> Optional[Tuple[Any, Any]]:
