@@ -34,7 +34,11 @@ foreach(prefix IN ITEMS /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE} /usr/lib /usr/loc
     break()
   endif()
 endforeach()
+# Quietly: Debian's Imath tells of a file for Python that is not needed here, in words that look like a failure.
+set(bilayer_log_level "${CMAKE_MESSAGE_LOG_LEVEL}")
+set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
 find_dependency(OpenVDB)
+set(CMAKE_MESSAGE_LOG_LEVEL "${bilayer_log_level}")
 set(CMAKE_MODULE_PATH ${bilayer_module_path})
 set(BUILD_SHARED_LIBS ${bilayer_shared})
 

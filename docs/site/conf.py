@@ -29,6 +29,8 @@ highlight_language = "none"
 html_theme = "furo"
 html_title = f"bilayer {release}"
 html_copy_source = False
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 html_show_sphinx = False
 html_show_copyright = False
 

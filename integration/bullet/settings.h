@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Recommended settings for a body's field, before anything is built: voxel size, band, margin and substeps.
-// docs/contacts.md lists the rules.
+// docs/contacts/settings.md lists the rules.
 #pragma once
 
 #include <cstdint>

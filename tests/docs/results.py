@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: results.py SOURCE: checks that measured tables stand in docs/results/ and docs/paper.md alone, that each page there
-says how its figures were measured, and that docs/results.md and docs/README.md link all of these pages."""
+says how its figures were measured, that docs/results.md and docs/README.md link all of these pages, and that other pages quote
+times and ratios with a link to the results that have them."""
 
 import re
 import sys
@@ -9,6 +10,12 @@ from pathlib import Path
 CONDITIONS = ["command", "machine", "date", "versions", "compared with"]
 DATE = re.compile(r"\d{4}-\d\d-\d\d|not recorded")
 TABLE = re.compile(r"^(\|[^\n]*)\n\|[ :|-]+\|\n((?:\|[^\n]*\n)*)", re.M)
+FIGURE = re.compile(r"\b([\d.,]*\d)(?: to ([\d.,]*\d))? (?:ns|us|ms|(?:times|frames) (?:as (?:fast|long)|a second))\b")
+CELL = re.compile(r"[\d.,]+(?: to [\d.,]+)? (?:ns|us|ms|s|KB|MB|MiB|GiB)")  # a whole one of a table
+NUMBER = re.compile(r"\d[\d,]*(?:\.\d+)?")
+LINK = re.compile(r"\]\(([\w./-]+\.md)(?:#[\w-]*)?\)")
+CODE = re.compile(r"^```.*?^```$", re.M | re.S)
+PARAGRAPH = re.compile(r"\n\s*\n|\n(?=- |\d+\. |\|)")  # between two of them, items of lists or rows of tables
 MEASURED = re.compile(r"\[(?:us|ms|s|KB|MB|MiB|%)\]|\bns a query\b|\btimes as fast\b|\bseconds\b")  # in the head of a table
 
 
@@ -28,6 +35,33 @@ def faults_of_results(name, page):
             yield f"{name}: the date '{rows[2][1]}' is neither YYYY-MM-DD nor 'not recorded'"
 
 
+def is_results(root, path):
+    return path.parent == root / "docs" / "results" or path in (root / "docs" / "results.md", root / "docs" / "paper.md")
+
+
+def rounds_to(figure, number):
+    """Whether a figure, as it is written, is that number rounded to its digits."""
+    digits = len(figure.partition(".")[2])
+    return abs(float(figure.replace(",", "")) - float(number.replace(",", ""))) <= 0.5001 * 10.0**-digits
+
+
+def faults_of_quotes(root, path):
+    """Times and ratios in the text of a page that no page of results has, or that come without a link to one."""
+    for paragraph in PARAGRAPH.split(CODE.sub("", path.read_text())):
+        figures = [figure for match in FIGURE.finditer(paragraph) for figure in match.groups() if figure]
+        linked = [path.parent / link for link in LINK.findall(paragraph)]
+        numbers = NUMBER.findall("".join(page.read_text() for page in linked if is_results(root, page.resolve())))
+        for figure in figures:
+            if not any(rounds_to(figure, number) for number in numbers):
+                yield f"{path.relative_to(root)}: no page of results that is linked there has the figure {figure}: {paragraph.strip()}"
+
+
+def faults_of_tables(root, path):
+    for head, rows in tables(path.read_text()):
+        if MEASURED.search(head) or any(CELL.fullmatch(cell) for row in rows for cell in row):
+            yield f"{path.relative_to(root)}: a measured table belongs into docs/results: {head}"
+
+
 def faults(root):
     docs = root / "docs"
     results = sorted((docs / "results").glob("*.md"))
@@ -38,12 +72,10 @@ def faults(root):
         for index in ("results.md", "README.md"):
             if f"(results/{path.name}" not in (docs / index).read_text():
                 yield f"docs/{index} does not link results/{path.name}"
-    for path in [root / "README.md", *sorted(docs.rglob("*.md"))]:
-        if path.parent == docs / "results" or path in (docs / "results.md", docs / "paper.md"):
-            continue
-        for head, _ in tables(path.read_text()):
-            if MEASURED.search(head):
-                yield f"{path.relative_to(root)}: a measured table belongs into docs/results: {head}"
+    for path in [*sorted(root.glob("*.md")), *sorted(docs.rglob("*.md"))]:
+        if not is_results(root, path):
+            yield from faults_of_tables(root, path)
+            yield from faults_of_quotes(root, path)
 
 
 if __name__ == "__main__":

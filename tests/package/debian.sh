@@ -55,6 +55,7 @@ g++ -std=c++20 cube.cpp $(pkg-config --cflags --libs bilayer-sdf) -o cube
 
 echo "== removed without a trace"
 apt-get purge -y -qq bilayer libbilayer-dev python3-bilayer >/dev/null 2>&1
-[[ -z $(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*') ]]
+left=$(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*')
+[[ -z $left ]] || { echo "debian.sh: left behind: $left"; exit 1; }
 IN_ROOT
 echo "the packages work in a clean Debian 12"

@@ -36,6 +36,8 @@ def faults(root):
         for component in components:
             if not re.search(rf"\b{component}\b", text):
                 yield f"{name} does not know the component {component}"
+    if not {"build", "out"} <= set((root / ".dockerignore").read_text().split()):
+        yield ".dockerignore lets build folders into the image: their caches name another folder"
     if "RUN ./run package" not in (root / "packaging" / "Dockerfile").read_text():
         yield "the Dockerfile does not make packages by ./run package"
 
