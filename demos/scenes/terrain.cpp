@@ -19,15 +19,17 @@
 namespace bilayer::demo {
 namespace {
 
-constexpr float gravity = 9.81f;        // [m/s^2]
-constexpr float startX = -5, lane = 1;  // [m]
-constexpr float groundVoxel = 0.05f;    // of the field, which Bullet does not use [m]
-constexpr float settled = 0.25f;        // start of the speed measurements [s]
-constexpr double maxSpeedError = 2;     // [%]
-constexpr double maxAngle = 5;          // between a contact normal and those of the triangles around it [degrees]
-constexpr double aroundContact = 0.25;  // distance within which triangles count as around it [voxels]
-constexpr double maxPenetration = 0.5;  // [voxels]
-constexpr double maxEnergyRise = 1e-2;  // [parts of the peak of the kinetic energy]
+constexpr float gravity = 9.81f;         // [m/s^2]
+constexpr float startX = -5, lane = 1;   // [m]
+constexpr float groundVoxel = 0.05f;     // of the field, which Bullet does not use [m]
+constexpr float settled = 0.25f;         // start of the speed measurements [s]
+constexpr float capsuleRadius = 0.15f;   // [m]
+constexpr float rollingFriction = 0.7f;  // coefficient of a body that rolls, and of its ground
+constexpr double maxSpeedError = 2;      // [%]
+constexpr double maxAngle = 5;           // between a contact normal and those of the triangles around it [degrees]
+constexpr double aroundContact = 0.25;   // distance within which triangles count as around it [voxels]
+constexpr double maxPenetration = 0.5;   // [voxels]
+constexpr double maxEnergyRise = 1e-2;   // [parts of the peak of the kinetic energy]
 
 constexpr Look groundLook{.colour = 0x5b7553, .roughness = 0.9f};
 
@@ -35,6 +37,7 @@ struct Kind {
     std::string name;
     Mesh mesh;
     std::uint32_t colour;
+    float radius = 0;  ///< of a body that rolls about the y axis; 0: it does not roll [m]
 };
 
 // An upright prism with an L-shaped base, 0.6 m long.
@@ -56,7 +59,7 @@ Mesh angleIron() {
 
 // A capsule along y, 0.7 m long.
 Mesh capsule() {
-    constexpr float radius = 0.15f, half = 0.2f;
+    constexpr float radius = capsuleRadius, half = 0.2f;
     constexpr int rings = 24;
     std::vector<glm::vec2> profile;
     for (int side = -1; side <= 1; side += 2)
@@ -76,8 +79,8 @@ std::vector<Kind> kinds() {
     return {{"block", shapes::box({0.3f, 0.3f, 0.15f}), 0xe07a5f},
             {"L", angleIron(), 0x81b29a},
             {"gear", shapes::gear(gear), 0x3d5a80},
-            {"ball", shapes::sphere(0.25f), 0xf2cc8f},
-            {"capsule", capsule(), 0xb56576},
+            {"ball", shapes::sphere(0.25f), 0xf2cc8f, 0.25f},
+            {"capsule", capsule(), 0xb56576, capsuleRadius},
             {"bowl", shapes::bowl(0.3f, 0.05f), 0x6d597a}};
 }
 
@@ -85,21 +88,35 @@ std::vector<Kind> kinds() {
 struct Rider {
     std::string name;
     btRigidBody& body;
-    float energy = 0;  ///< after it has settled [J/kg]
+    float linearShare = 1;  ///< of the kinetic energy
+    float energy = 0;       ///< after it has settled [J/kg]
 
-    float kinetic() const { return 0.5f * float(body.getLinearVelocity().length2()); }
+    float kinetic() const { return 0.5f * float(body.getLinearVelocity().length2()) / linearShare; }
     float potential() const { return gravity * float(body.getCenterOfMassPosition().z()); }
     /// Returns the error of its speed [%].
     double speedError() const {
-        const double expected = std::sqrt(std::max(2.0 * (energy - potential()), 0.0));
+        const double expected = std::sqrt(std::max(2.0 * (energy - potential()) * linearShare, 0.0));
         return 100 * (double(body.getLinearVelocity().length()) / expected - 1);
     }
 };
+
+float frictionOf(const TerrainOptions& options) {
+    return options.rolls ? rollingFriction : 0;
+}
+
+/// Rolls a body of 1 kg about the y axis, which it keeps.
+void roll(Rider& rider, float radius, float speed) {
+    rider.body.setAngularFactor({0, 1, 0});
+    rider.body.setAngularVelocity({0, speed / radius, 0});
+    const float moment = 1 / rider.body.getInvInertiaTensorWorld()[1][1];
+    rider.linearShare = 1 / (1 + moment / (radius * radius));
+}
 
 std::vector<Rider> addRiders(Stage& stage, const Waves& waves, const TerrainOptions& options) {
     std::vector<Rider> riders;
     const std::vector<Kind> all = kinds();
     for (std::size_t i = 0; i < all.size(); ++i) {
+        if (options.rolls && all[i].radius == 0) continue;
         const float y = lane * (float(i) - 0.5f * float(all.size() - 1));
         const auto thing = makeThing(all[i].mesh, {options.voxelSize});
         float lowest = 0, farthest = 0;
@@ -108,12 +125,13 @@ std::vector<Rider> addRiders(Stage& stage, const Waves& waves, const TerrainOpti
             farthest = std::max(farthest, glm::length(glm::vec2(p)));
         }
         const float z = waves.highestAround(startX, y, farthest) - lowest;
-        const Matter matter{.mass = 1, .friction = 0, .linearDamping = 0, .angularDamping = 0};
+        const Matter matter{.mass = 1, .friction = frictionOf(options), .linearDamping = 0, .angularDamping = 0};
         btRigidBody& body = stage.add(thing, matter, {{startX, y, z}}, {.colour = all[i].colour});
         body.setActivationState(DISABLE_DEACTIVATION);
         body.setLinearVelocity({options.speed, 0, 0});
         body.setLinearFactor({1, 0, 1});  // moves as between frictionless rails: slopes would move it into other lanes
         riders.push_back({all[i].name, body});
+        if (options.rolls) roll(riders.back(), all[i].radius, options.speed);
     }
     return riders;
 }
@@ -153,8 +171,8 @@ Outcome terrain(const TerrainOptions& options) {
                                             .stepsPerFrame = std::max(1, int(options.stepsPerSecond / 60)),
                                             .framesPerMeasuring = 4});
     const Waves waves({options.height, options.cell, options.heightField});
-    const btRigidBody& ground =
-        stage.add(makeThing(waves.solid(), waves.shape(), groundVoxel), {.friction = 0}, {}, groundLook);
+    const btRigidBody& ground = stage.add(makeThing(waves.solid(), waves.shape(), groundVoxel),
+                                          {.friction = frictionOf(options)}, {}, groundLook);
     std::vector<Rider> riders = addRiders(stage, waves, options);
     stage.run(settled);
     for (Rider& rider : riders) rider.energy = rider.kinetic() + rider.potential();

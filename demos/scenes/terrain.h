@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bodies slide without friction over a wavy triangle mesh, the typical ground of games and robotics. Contacts with
-// internal edges, known as ghost collisions, would slow them down.
+// Bodies slide without friction, or roll, over a wavy triangle mesh, the typical ground of games and robotics. Contacts
+// with internal edges, known as ghost collisions, would slow them down, and so would impacts on shallow edges.
 #pragma once
 
 #include "demos/shared/outcome.h"
@@ -11,6 +11,7 @@ struct TerrainOptions {
     float height = 0.01f;      ///< amplitude of the waves, whose wavelengths are 3 and 4.8 m [m]
     float cell = 0.25f;        ///< edge of the squares of two triangles each that form the ground [m]
     bool heightField = false;  ///< the ground is a btHeightfieldTerrainShape; otherwise a btBvhTriangleMeshShape
+    bool rolls = false;        ///< only the ball and the capsule, which roll with friction; otherwise six bodies slide
     float speed = 2;           ///< initial speed [m/s]
     float seconds = 3;
     float stepsPerSecond = 240;
@@ -18,7 +19,8 @@ struct TerrainOptions {
 };
 
 /// Criteria, after a quarter of a second in which bodies settle:
-/// - The speed of each body is that of a frictionless point with constant energy, within 2 %.
+/// - The speed of each body is that of a frictionless point with constant energy, within 2 %. A body that rolls has a
+///   constant share of its kinetic energy in its rotation.
 /// - No contact normal is more than 5 degrees outside of the normals of the triangles around it.
 /// - No body penetrates the ground by half a voxel.
 /// - Energy never rises by 1 %.

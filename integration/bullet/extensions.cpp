@@ -2,14 +2,17 @@
 #include <BulletDynamics/Dynamics/btActionInterface.h>
 #include <bilayer/integration/bullet/extensions.h>
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
+#include <vector>
 
 #include "integration/bullet/detail/continuous_collision.h"
 #include "integration/bullet/detail/gyroscopic_integrator.h"
 #include "integration/bullet/detail/rest_stabilisation.h"
+#include "integration/bullet/detail/smooth_ground.h"
 
 namespace bilayer::bullet {
 
@@ -30,24 +33,25 @@ class WorldExtensions::Hook : public btActionInterface {
     Hook(btDynamicsWorld& world, const ExtensionOptions& options) : world_(world) {
         if (options.continuousCollision) collision.emplace(world);
         if (options.restStabilisation) rest.emplace(world);
-        if (options.gyroscopicIntegration) integrateGyroscopically();
+        if (options.smoothGround) ground_.emplace(world);
+        if (options.gyroscopicIntegration) gyroscopic_.emplace(world);
+        if (ground_ || gyroscopic_) join();
         world_.addAction(this);
     }
 
     ~Hook() override {
         world_.removeAction(this);
-        if (!gyroscopic_) return;
-        const std::lock_guard lock(mutex_);
-        hooks_.erase(&world_);
-        if (PreTick::of(world_) == preTick) PreTick::of(world_) = users_;
+        if (ground_ || gyroscopic_) leave();
     }
 
     void updateAction(btCollisionWorld*, btScalar seconds) override {
+        if (ground_) ground_->afterStep(seconds);
         if (collision) collision->afterStep(seconds);
         if (rest) rest->afterStep(seconds);
-        if (!gyroscopic_) return;
-        gyroscopic_->afterStep();
-        takePreTick();
+        if (gyroscopic_) gyroscopic_->afterStep();
+        if (!ground_ && !gyroscopic_) return;
+        const std::lock_guard lock(mutex_);
+        takePreTick(worlds_.at(&world_));
     }
     void debugDraw(btIDebugDraw*) override {}
 
@@ -55,41 +59,63 @@ class WorldExtensions::Hook : public btActionInterface {
     std::optional<RestStabilisation> rest;
 
   private:
+    /// The pre-tick callbacks of a world.
+    struct PreTicks {
+        std::vector<Hook*> hooks;
+        btInternalTickCallback users = nullptr;
+    };
+
     static void preTick(btDynamicsWorld* world, btScalar seconds) {
-        Hook* hook = nullptr;
+        PreTicks all;
         {
             const std::lock_guard lock(mutex_);
-            if (const auto found = hooks_.find(world); found != hooks_.end()) hook = found->second;
+            if (const auto found = worlds_.find(world); found != worlds_.end()) all = found->second;
         }
-        if (!hook) return;
-        if (hook->users_) hook->users_(world, seconds);
-        hook->gyroscopic_->beforeStep(seconds);
+        if (all.users) all.users(world, seconds);
+        for (Hook* hook : all.hooks)
+            if (hook->gyroscopic_) hook->gyroscopic_->beforeStep(seconds);
+        // one of them is enough
+        const auto ground =
+            std::find_if(all.hooks.begin(), all.hooks.end(), [](Hook* hook) { return hook->ground_.has_value(); });
+        if (ground != all.hooks.end()) (*ground)->ground_->beforeStep();
     }
 
-    void integrateGyroscopically() {
+    void join() {
         const std::lock_guard lock(mutex_);
-        if (!hooks_.emplace(&world_, this).second)
+        PreTicks& all = worlds_[&world_];
+        const bool isSecond = std::any_of(all.hooks.begin(), all.hooks.end(),
+                                          [&](const Hook* other) { return gyroscopic_ && other->gyroscopic_; });
+        if (isSecond)
             throw std::invalid_argument(
                 "WorldExtensions: another one of this world integrates gyroscopically already; set "
                 "ExtensionOptions::gyroscopicIntegration in only one of them");
-        gyroscopic_.emplace(world_);
-        takePreTick();
+        all.hooks.push_back(this);
+        takePreTick(all);
+    }
+
+    void leave() {
+        const std::lock_guard lock(mutex_);
+        PreTicks& all = worlds_.at(&world_);
+        std::erase(all.hooks, this);
+        if (!all.hooks.empty()) return;
+        if (PreTick::of(world_) == preTick) PreTick::of(world_) = all.users;
+        worlds_.erase(&world_);
     }
 
     // also replaces a callback that the user has set later
-    void takePreTick() {
+    void takePreTick(PreTicks& all) {
         btInternalTickCallback& current = PreTick::of(world_);
         if (current == preTick) return;
-        users_ = current;
+        all.users = current;
         current = preTick;
     }
 
-    static inline std::mutex mutex_;                         // guards the members below
-    static inline std::map<btDynamicsWorld*, Hook*> hooks_;  // those with a gyroscopic integrator
+    static inline std::mutex mutex_;                             // guards the member below
+    static inline std::map<btDynamicsWorld*, PreTicks> worlds_;  // those with hooks that act before a step
 
     btDynamicsWorld& world_;
+    std::optional<SmoothGround> ground_;
     std::optional<GyroscopicIntegrator> gyroscopic_;
-    btInternalTickCallback users_ = nullptr;
 };
 
 WorldExtensions::WorldExtensions(btDynamicsWorld& world, const ExtensionOptions& options)

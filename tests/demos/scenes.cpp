@@ -94,6 +94,11 @@ TEST_CASE("bodies keep their speed over waves of triangles") {
         options.cell = 0.1f;
         judgeOnce(demo::terrain(options));
     }
+    SECTION("high waves of large triangles") {
+        options.height = 0.1f;
+        options.cell = GENERATE(0.3f, 0.6f);
+        judgeOnce(demo::terrain(options));
+    }
     SECTION("large triangles") {
         options.height = 0.02f;
         options.cell = 2.4f;

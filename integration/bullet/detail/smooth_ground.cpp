@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integration/bullet/detail/smooth_ground.h"
+
+#include <BulletCollision/CollisionShapes/btConcaveShape.h>
+#include <LinearMath/btAabbUtil2.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <unordered_map>
+
+#include "collider/contact/open_surface.h"
+#include "integration/bullet/detail/body_sweep.h"
+#include "integration/bullet/detail/compound.h"
+#include "integration/bullet/detail/contact_shapes.h"
+#include "integration/bullet/detail/convert.h"
+
+namespace bilayer::bullet::detail {
+
+namespace {
+
+// Impacts up to this multiple of the energy that the sharpest edge under a body can take from it are given back. A
+// block touches several edges at once and rocks; its later impacts take what the earlier ones have put into that.
+constexpr float maxEdges = 4;
+// A body that is slower along the ground than this may be at rest [speeds that gravity adds in a step].
+constexpr float restSpeed = 2;
+// Approach velocities below this fraction of the speed along the ground are rounding.
+constexpr float minSlope = 1e-3f;
+// Maximum change of a body's kinetic energy in a step, relative.
+constexpr float maxChange = 0.2f;
+
+bool isTriangles(const btCollisionShape& shape) {
+    const int type = shape.getShapeType();
+    return shape.isConcave() && type != FAST_CONCAVE_MESH_PROXYTYPE && type != STATIC_PLANE_PROXYTYPE;
+}
+
+/// The ground's triangles in the bounding box of a body, in the ground's coordinates.
+std::vector<Triangle> trianglesUnder(const btRigidBody& body, const btCollisionObject& ground) {
+    btVector3 lower, upper;
+    body.getCollisionShape()->getAabb(ground.getWorldTransform().inverse() * body.getWorldTransform(), lower, upper);
+    std::vector<Triangle> triangles;
+    const auto add = [&](const Triangle& triangle, std::uint64_t) {
+        const btVector3 corners[] = {toBullet(triangle[0]), toBullet(triangle[1]), toBullet(triangle[2])};
+        if (TestTriangleAgainstAabb2(corners, lower, upper)) triangles.push_back(triangle);
+    };
+    sheetOf(static_cast<const btConcaveShape&>(*ground.getCollisionShape())).visit({toGlm(lower), toGlm(upper)}, add);
+    return triangles;
+}
+
+}  // namespace
+
+float FacetImpact::loss(float turn) const {
+    const float caused = speed * std::tan(turn) * std::sqrt(maxEdges * mobility), ratio = caused / before;
+    return -0.5f * impulse * (before + after) * std::min(ratio * ratio, 1.f);
+}
+
+void SmoothGround::beforeStep() {
+    before_.clear();
+    const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
+    for (int i = 0; i < objects.size(); ++i)
+        before_.push_back({objects[i], activeDynamicBody(*objects[i]) ? velocityOf(*objects[i]) : Velocity{}});
+}
+
+const Velocity* SmoothGround::velocityBefore(const btCollisionObject& object) const {
+    const auto index = std::size_t(object.getWorldArrayIndex());
+    const bool isKnown = index < before_.size() && before_[index].object == &object;
+    return isKnown ? &before_[index].velocity : nullptr;
+}
+
+float SmoothGround::turnUnder(const Ground& ground) {
+    const auto [turn, isNew] = turns_.try_emplace(ground, 0.f);
+    if (isNew) turn->second = maxSmoothTurn(trianglesUnder(*ground.first, *ground.second));
+    return turn->second;
+}
+
+float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& ground, float seconds) {
+    const btRigidBody& body = *ground.first;
+    const Velocity* before = velocityBefore(body);
+    if (!before) return 0;
+    const bool bodyIsFirst = manifold.getBody0() == &body;
+    // The centre has moved since the contacts were found, but their positions have not.
+    const Velocity after{before->centre, body.getLinearVelocity(), body.getAngularVelocity()};
+    float loss = 0;
+    for (int i = 0; i < manifold.getNumContacts(); ++i) {
+        const btManifoldPoint& point = manifold.getContactPoint(i);
+        if (!(point.m_appliedImpulse > 0)) continue;
+        const btVector3 place = bodyIsFirst ? point.getPositionWorldOnA() : point.getPositionWorldOnB();
+        const btVector3 normal = (bodyIsFirst ? 1.f : -1.f) * point.m_normalWorldOnB;
+        const btVector3 along = before->linear - normal.dot(before->linear) * normal;
+        const FacetImpact impact{point.m_appliedImpulse, normal.dot(before->at(place)), normal.dot(after.at(place)),
+                                 along.length(), body.computeImpulseDenominator(place, normal) / body.getInvMass()};
+        if (impact.speed < restSpeed * seconds * body.getGravity().length()) continue;
+        if (std::abs(impact.before) > minSlope * impact.speed) loss += impact.loss(turnUnder(ground));
+    }
+    return loss;
+}
+
+/// The energy returns to the linear velocity: a block that turns about the vertical is not turned faster.
+void SmoothGround::afterStep(float seconds) {
+    std::unordered_map<btRigidBody*, float> losses;
+    for (int m = 0; m < world_.getDispatcher()->getNumManifolds(); ++m) {
+        const btPersistentManifold& manifold = *world_.getDispatcher()->getManifoldByIndexInternal(m);
+        const btCollisionObject *object = manifold.getBody0(), *ground = manifold.getBody1();
+        if (object->isStaticObject()) std::swap(object, ground);
+        btRigidBody* const body = activeDynamicBody(const_cast<btCollisionObject&>(*object));
+        if (!body || !ground->isStaticObject() || !isTriangles(*ground->getCollisionShape())) continue;
+        if (holdsField(*body->getCollisionShape())) losses[body] += lossIn(manifold, {body, ground}, seconds);
+    }
+    for (const auto& [body, loss] : losses) {
+        const float kinetic = 0.5f * body->getLinearVelocity().length2() / body->getInvMass();
+        if (loss == 0 || !(kinetic > 0)) continue;
+        const float change = std::clamp(loss / kinetic, -maxChange, maxChange);
+        body->setLinearVelocity(std::sqrt(1 + change) * body->getLinearVelocity());
+    }
+    before_.clear();
+    turns_.clear();
+}
+
+}  // namespace bilayer::bullet::detail

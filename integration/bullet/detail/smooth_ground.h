@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Smooth ground: bodies that slide or roll over triangles keep their energy.
+#pragma once
+
+#include <BulletDynamics/Dynamics/btDynamicsWorld.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "integration/bullet/detail/velocity.h"
+
+namespace bilayer::bullet::detail {
+
+/// An impact on a triangle of the ground, in the direction of the contact normal.
+struct FacetImpact {
+    float impulse;   ///< [N s]
+    float before;    ///< velocity of the contact point before the step, without the forces of the step [m/s]
+    float after;     ///< the same after the step [m/s]
+    float speed;     ///< of the body's centre along the triangle, before the step [m/s]
+    float mobility;  ///< the contact point's inverse effective mass times the body's mass; 1 in line with the centre
+
+    /// The energy that the impact takes, up to what an edge with this turn can cause [J]. Negative: it adds energy.
+    float loss(float turn) const;
+};
+
+/// Gives bodies back what shallow edges of the ground take: ExtensionOptions::smoothGround.
+class SmoothGround {
+  public:
+    explicit SmoothGround(btDynamicsWorld& world) : world_(world) {}
+
+    void beforeStep();
+    /// Does nothing without beforeStep().
+    void afterStep(float seconds);
+
+  private:
+    using Ground = std::pair<const btRigidBody*, const btCollisionObject*>;  ///< a body and the ground under it
+    struct State {
+        const btCollisionObject* object;
+        Velocity velocity;
+    };
+    const Velocity* velocityBefore(const btCollisionObject& object) const;
+    float turnUnder(const Ground& ground);
+    float lossIn(const btPersistentManifold& manifold, const Ground& ground, float seconds);
+
+    btDynamicsWorld& world_;
+    std::vector<State> before_;      ///< of the world's objects, in its order; only active bodies have a velocity
+    std::map<Ground, float> turns_;  ///< those asked for in this step [rad]
+};
+
+}  // namespace bilayer::bullet::detail

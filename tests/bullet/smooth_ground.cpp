@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bodies keep their energy over triangles that stand for smooth ground, and only there.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/trigonometric.hpp>
+#include <memory>
+#include <vector>
+
+#include <bilayer/integration/bullet/extensions.h>
+#include "collider/contact/open_surface.h"
+#include "demos/shared/shapes.h"
+#include "demos/shared/waves.h"
+#include "integration/bullet/detail/smooth_ground.h"
+#include "tests/support/random.h"
+#include "tests/support/support.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+using bullet::WorldExtensions;
+using bullet::detail::FacetImpact;
+
+namespace {
+
+constexpr float gravity = 9.81f, voxel = 0.0125f;  // [m/s^2], [m]
+
+double kineticEnergyOf(const btRigidBody& body) {
+    const btVector3 spin = body.getAngularVelocity();
+    const btMatrix3x3 inertia = body.getInvInertiaTensorWorld().inverse();
+    return 0.5 * double(body.getLinearVelocity().length2() + spin.dot(inertia * spin));
+}
+
+/// A body of 1 kg that moves over ground without friction, along x.
+struct Slider {
+    World world;
+    btRigidBody* body;
+
+    Slider(btCollisionShape& ground, btCollisionShape& shape, const btVector3& at, const btVector3& velocity) {
+        world.add(ground, 0, {0, 0, 0});
+        body = world.add(shape, 1, at);
+        body->setFriction(0);
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        body->setLinearVelocity(velocity);
+        body->setLinearFactor({1, 0, 1});
+    }
+    double energy() const {
+        return kineticEnergyOf(*body) + double(gravity) * double(body->getCenterOfMassPosition().z());
+    }
+    void run(float seconds, float stepsPerSecond) {
+        for (int i = 0; i < int(seconds * stepsPerSecond); ++i) world.dynamics.stepSimulation(1 / stepsPerSecond, 0);
+    }
+};
+
+/// The part of its kinetic energy that a body loses in two seconds over waves.
+double lossOver(const demo::Waves& waves, btCollisionShape& shape, float height, float y, float stepsPerSecond,
+                bool smoothGround) {
+    const auto ground = waves.shape();
+    Slider slider(*ground, shape, {-5, y, height + waves.highestAround(-5, y, 0.45f)}, {2, 0, 0});
+    const WorldExtensions extensions(slider.world.dynamics, {.smoothGround = smoothGround});
+    slider.run(0.5f, stepsPerSecond);
+    const double start = slider.energy(), kinetic = kineticEnergyOf(*slider.body);
+    slider.run(2, stepsPerSecond);
+    return (start - slider.energy()) / kinetic;
+}
+
+}  // namespace
+
+TEST_CASE("Bodies keep their energy over waves of triangles of any size, at any step") {
+    const unsigned seed = test::seed();
+    Random random(seed);
+    Shape block(exactBox({0.3f, 0.3f, 0.15f}, voxel)), ball(exactSphere(0.25f, voxel));
+    double sum = 0, sumWithout = 0;
+    for (int i = 0; i < 12; ++i) {
+        const float height = float(random(0.03, 0.1)), cell = float(std::exp(random(std::log(0.15), std::log(1.2))));
+        const float steps = float(60 << i % 4), y = float(random(-1, 1));
+        const bool isBlock = i % 3;
+        CAPTURE(seed, i, height, cell, steps, y, isBlock);
+        const demo::Waves waves({height, cell, i % 2 > 0});
+        btCollisionShape& shape = isBlock ? block : ball;
+        const float top = isBlock ? 0.15f : 0.25f;
+        const double loss = lossOver(waves, shape, top, y, steps, true);
+        CHECK(std::abs(loss) < 0.02);  // 1 % of the speed
+        sum += std::abs(loss);
+        sumWithout += lossOver(waves, shape, top, y, steps, false);
+    }
+    CAPTURE(seed);
+    CHECK(sum < 0.1 * sumWithout);
+}
+
+TEST_CASE("A body that drops on waves loses its speed there") {
+    const unsigned seed = test::seed();
+    Random random(seed);
+    Shape ball(exactSphere(0.25f, voxel));
+    const demo::Waves waves({0.1f, 0.25f});
+    const auto ground = waves.shape();
+    for (int i = 0; i < 4; ++i) {
+        const float y = float(random(-1, 1));
+        CAPTURE(seed, i, y);
+        // at 60 degrees, with 9 J
+        Slider slider(*ground, ball, {-5, y, 0.75f}, {2, 0, -3.5f});
+        const WorldExtensions extensions(slider.world.dynamics);
+        const double before = slider.energy();
+        slider.run(0.5f, 240);
+        CHECK(slider.energy() < before - 5);
+    }
+}
+
+TEST_CASE("Smooth ground changes no bit of bodies on flat triangles and of bodies at rest") {
+    const unsigned seed = test::seed();
+    Random random(seed);
+    Shape block(exactBox({0.3f, 0.3f, 0.15f}, voxel));
+    const demo::Waves flat({0, 0.25f}), waves({0.1f, 0.25f});
+    const auto floor = flat.shape(), rough = waves.shape();
+    for (int i = 0; i < 4; ++i) {
+        const bool isFlat = i % 2;
+        const float x = float(random(-3, -2)), y = float(random(-1, 1)), height = float(random(0.16, 0.3));
+        CAPTURE(seed, i, isFlat, x, y, height);
+        const auto end = [&](bool smoothGround) {
+            const btVector3 velocity = isFlat ? btVector3(2, 0, 0) : btVector3(0, 0, 0);
+            Slider slider(isFlat ? *floor : *rough, block, {x, y, height + (isFlat ? 0 : 0.1f)}, velocity);
+            if (!isFlat) {  // comes to rest first
+                slider.body->setFriction(2);
+                slider.run(2, 240);
+            }
+            const WorldExtensions extensions(slider.world.dynamics, {.smoothGround = smoothGround});
+            slider.run(1, 240);
+            return slider.body->getWorldTransform();
+        };
+        CHECK(end(true) == end(false));
+    }
+}
+
+TEST_CASE("Several world extensions give energy back once") {
+    Shape ball(exactSphere(0.25f, voxel));
+    const demo::Waves waves({0.1f, 0.25f});
+    const auto ground = waves.shape();
+    const auto end = [&](int count) {
+        Slider slider(*ground, ball, {-5, 0.3f, 0.35f}, {2, 0, 0});
+        std::vector<std::unique_ptr<WorldExtensions>> extensions;
+        for (int i = 0; i < count; ++i) extensions.push_back(std::make_unique<WorldExtensions>(slider.world.dynamics));
+        slider.run(1, 60);
+        if (count > 1) extensions.erase(extensions.begin());  // the next one goes on
+        slider.run(1, 60);
+        return slider.body->getWorldTransform();
+    };
+    CHECK(end(3) == end(1));
+    CHECK_FALSE(end(1) == end(0));
+}
+
+TEST_CASE("An impact takes what momentum and energy say, and no more counts than an edge can cause") {
+    const unsigned seed = test::seed();
+    Random random(seed);
+    for (int i = 0; i < 20; ++i) {
+        // a point of unit mass on a plane that rises by an angle, without a bounce
+        const float angle = float(random(0.01, 0.3)), speed = float(random(0.5, 4));
+        CAPTURE(seed, i, angle, speed);
+        const float approach = speed * std::sin(angle), along = speed * std::cos(angle);
+        const FacetImpact impact{approach, -approach, 0, along, 1};
+        const double lost = 0.5 * double(approach * approach);
+        CHECK(double(impact.loss(angle)) == Approx(lost));
+        CHECK(double(impact.loss(0.2f * angle)) < 0.2 * lost);
+        CHECK(impact.loss(0) == 0);
+    }
+}
+
+TEST_CASE("The maximum turn of smooth edges is that of two half planes, without sharp edges") {
+    const auto roof = [](float angle) {
+        const float x = std::cos(angle), z = std::sin(angle);
+        return std::vector<Triangle>{{{{0, 0, 0}, {0, 1, 0}, {-1, 0, 0}}}, {{{0, 0, 0}, {x, 0, z}, {0, 1, 0}}}};
+    };
+    for (const float degrees : {0.1f, 3.f, 12.f, 19.f})
+        CHECK(detail::maxSmoothTurn(roof(glm::radians(degrees))) == Approx(glm::radians(degrees)).epsilon(1e-3));
+    CHECK(detail::maxSmoothTurn(roof(0)) == 0);
+    CHECK(detail::maxSmoothTurn(roof(glm::radians(30.f))) == 0);
+    CHECK(detail::maxSmoothTurn({}) == 0);
+}
