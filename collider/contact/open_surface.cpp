@@ -21,8 +21,6 @@ constexpr float minMean = 0.26f;
 // projections, or the result is more than 60 degrees from the direction (cosine).
 constexpr float coneTolerance = 1e-3f, minConeCosine = 0.5f;
 constexpr int maxProjections = 20;
-// An edge is smooth if the surface turns by less than 20 degrees there (cosine).
-constexpr float smoothCosine = 0.94f;
 constexpr int maxIntervals = 64;  // maximum count of intervals of a path
 
 /// The end points of an edge in a unique order.
@@ -198,18 +196,6 @@ SharpFeatures sharpFeaturesOf(std::span<const Triangle> triangles) {
     for (const auto& [place, mean] : vertices)
         if (const auto outward = mean.outward()) sharp.vertices.push_back({{place[0], place[1], place[2]}, *outward});
     return sharp;
-}
-
-float maxSmoothTurn(std::span<const Triangle> triangles) {
-    const Adjacency adjacency(triangles);
-    float maxSine = 0;
-    for (std::uint32_t t = 0; t < triangles.size(); ++t)
-        for (int i = 0; i < 3; ++i) {
-            const auto conormals = adjacency.conormalsOf(t, i);
-            if (!conormals || !(-glm::dot((*conormals)[0], (*conormals)[1]) > smoothCosine)) continue;
-            maxSine = std::max(maxSine, glm::length(glm::cross((*conormals)[0], (*conormals)[1])));
-        }
-    return std::asin(std::min(maxSine, 1.f));
 }
 
 std::vector<Triangle> trianglesAlong(const TriangleSheet& sheet, std::span<const glm::vec3> path, float radius) {

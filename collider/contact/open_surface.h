@@ -76,10 +76,6 @@ struct SharpFeatures {
 };
 SharpFeatures sharpFeaturesOf(std::span<const Triangle> triangles);
 
-/// The maximum turn of the surface at the smooth edges of triangles: those with a turn below 20 degrees. 0 if there are
-/// none [rad].
-float maxSmoothTurn(std::span<const Triangle> triangles);
-
 /// The triangles of a sheet that a sphere may touch along a polyline, each once.
 std::vector<Triangle> trianglesAlong(const TriangleSheet& sheet, std::span<const glm::vec3> path, float radius);
 

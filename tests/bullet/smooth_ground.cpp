@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <bilayer/integration/bullet/extensions.h>
-#include "collider/contact/open_surface.h"
+#include "collider/contact/smooth_turn.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/waves.h"
 #include "integration/bullet/detail/smooth_ground.h"

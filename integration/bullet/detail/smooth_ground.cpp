@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/smooth_ground.h"
 
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
 #include <LinearMath/btAabbUtil2.h>
 
@@ -9,17 +10,21 @@
 #include <cstddef>
 #include <unordered_map>
 
-#include "collider/contact/open_surface.h"
+#include <bilayer/integration/bullet/shape.h>
+
+#include "collider/contact/collider_data.h"
+#include "collider/contact/smooth_turn.h"
 #include "integration/bullet/detail/body_sweep.h"
 #include "integration/bullet/detail/compound.h"
 #include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/pair_contacts.h"
 
 namespace bilayer::bullet::detail {
 
 namespace {
 
-// Impacts up to this multiple of the energy that the sharpest edge under a body can take from it are given back. A
+// Impacts up to this multiple of the energy that edges of the ground and of the body can take from it are given back. A
 // block touches several edges at once and rocks; its later impacts take what the earlier ones have put into that.
 constexpr float maxEdges = 4;
 // A body that is slower along the ground than this may be at rest [speeds that gravity adds in a step].
@@ -45,6 +50,25 @@ std::vector<Triangle> trianglesUnder(const btRigidBody& body, const btCollisionO
     };
     sheetOf(static_cast<const btConcaveShape&>(*ground.getCollisionShape())).visit({toGlm(lower), toGlm(upper)}, add);
     return triangles;
+}
+
+/// The turn of a body's own surface at a place, in the axes of its shape [rad].
+float turnOf(const btCollisionShape& shape, const btVector3& place) {
+    if (isField(shape)) {
+        const auto& field = static_cast<const Shape&>(shape);
+        const ColliderData& data = field.collider().data();
+        const Placed placed = field.placed(btTransform::getIdentity());
+        const glm::vec3 inField = glm::conjugate(placed.pose.rotation) * (toGlm(place) - placed.pose.position);
+        return data.body.mesh ? smoothTurnAt(data.meshTree(), inField / placed.scale) : 0;
+    }
+    float turn = 0;
+    if (!shape.isCompound()) return turn;
+    const auto& compound = static_cast<const btCompoundShape&>(shape);
+    for (int i = 0; i < compound.getNumChildShapes(); ++i) {
+        const btVector3 inChild = compound.getChildTransform(i).inverse() * place;
+        turn = std::max(turn, turnOf(*compound.getChildShape(i), inChild));
+    }
+    return turn;
 }
 
 }  // namespace
@@ -78,6 +102,7 @@ float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& g
     const Velocity* before = velocityBefore(body);
     if (!before) return 0;
     const bool bodyIsFirst = manifold.getBody0() == &body;
+    const float rotation = before->angular.length() * seconds;
     // The centre has moved since the contacts were found, but their positions have not.
     const Velocity after{before->centre, body.getLinearVelocity(), body.getAngularVelocity()};
     float loss = 0;
@@ -90,7 +115,9 @@ float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& g
         const FacetImpact impact{point.m_appliedImpulse, normal.dot(before->at(place)), normal.dot(after.at(place)),
                                  along.length(), body.computeImpulseDenominator(place, normal) / body.getInvMass()};
         if (impact.speed < restSpeed * seconds * body.getGravity().length()) continue;
-        if (std::abs(impact.before) > minSlope * impact.speed) loss += impact.loss(turnUnder(ground));
+        if (!(std::abs(impact.before) > minSlope * impact.speed)) continue;
+        const float own = turnOf(*body.getCollisionShape(), bodyIsFirst ? point.m_localPointA : point.m_localPointB);
+        loss += impact.loss(turnUnder(ground) + (own > 0 ? own + rotation : 0));
     }
     return loss;
 }

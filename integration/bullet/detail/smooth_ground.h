@@ -21,11 +21,12 @@ struct FacetImpact {
     float speed;     ///< of the body's centre along the triangle, before the step [m/s]
     float mobility;  ///< the contact point's inverse effective mass times the body's mass; 1 in line with the centre
 
-    /// The energy that the impact takes, up to what an edge with this turn can cause [J]. Negative: it adds energy.
+    /// The energy that the impact takes, up to what edges with this turn in all can cause [J]. Negative: it adds
+    /// energy.
     float loss(float turn) const;
 };
 
-/// Gives bodies back what shallow edges of the ground take: ExtensionOptions::smoothGround.
+/// Gives bodies back what shallow edges of the ground and their own take: ExtensionOptions::smoothGround.
 class SmoothGround {
   public:
     explicit SmoothGround(btDynamicsWorld& world) : world_(world) {}

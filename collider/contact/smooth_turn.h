@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a surface of triangles turns at its smooth edges: those with a turn below 20 degrees, which stand for a
+// smooth surface. Tested by tests/bullet/smooth_ground.cpp.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+
+#include "collider/contact/open_surface.h"
+#include "collider/field/mesh_tree.h"
+
+namespace bilayer::detail {
+
+/// The maximum turn at the smooth edges of triangles; 0 if there are none [rad].
+float maxSmoothTurn(std::span<const Triangle> triangles);
+
+/// The same of the triangle that is nearest to a point of its mesh [m]. 0 if none is within two voxels.
+float smoothTurnAt(const MeshTree& mesh, const glm::vec3& point);
+
+}  // namespace bilayer::detail
