@@ -34,11 +34,14 @@ foreach(prefix IN ITEMS /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE} /usr/lib /usr/loc
     break()
   endif()
 endforeach()
-# Quietly: Debian's Imath tells of a file for Python that is not needed here, in words that look like a failure.
+# Quietly: Debian's Imath reports a missing file for Python, which is not needed here.
 set(bilayer_log_level "${CMAKE_MESSAGE_LOG_LEVEL}")
 set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
-find_dependency(OpenVDB)
+find_package(OpenVDB)
 set(CMAKE_MESSAGE_LOG_LEVEL "${bilayer_log_level}")
+if(NOT OpenVDB_FOUND)  # an error, or the end of a package that is optional
+  find_dependency(OpenVDB)
+endif()
 set(CMAKE_MODULE_PATH ${bilayer_module_path})
 set(BUILD_SHARED_LIBS ${bilayer_shared})
 

@@ -71,7 +71,7 @@ Extent extentOf(const PlacedShape& body, const std::string& motion) {
     if (body.shape.collider()) return extentOf(placed(body));
     if (const auto* convex = std::get_if<Convex>(&shape)) return extentOf(*convex, double(body.scale));
     if (body.motion.rotation != glm::vec3(0))
-        throw std::invalid_argument(motion + " rotates a plane or a sheet of triangles, which has no end");
+        throw std::invalid_argument(motion + " must not rotate: a plane or a sheet of triangles has no radius");
     return {};
 }
 

@@ -11,6 +11,8 @@ namespace {
 
 /// An edge is smooth if the surface turns by less than 20 degrees there (cosine).
 constexpr float smoothCosine = 0.94f;
+/// Less is the rounding of normals [rad].
+constexpr double minTurn = 1e-3;
 /// Predicted contacts stay this close to their surface [voxels].
 constexpr float nearby = 2;
 
@@ -41,7 +43,7 @@ float smoothTurnAt(const MeshTree& tree, const glm::vec3& point) {
     for (int i = 0; i < 3; ++i) {
         const glm::dvec3 edge = tree.featureOf(triangle, 0.5 * (p[i] + p[(i + 1) % 3])).normal;
         const double turn = 2 * std::atan2(glm::length(glm::cross(face, edge)), glm::dot(face, edge));
-        if (std::cos(turn) > double(smoothCosine)) maxTurn = std::max(maxTurn, turn);
+        if (turn > minTurn && std::cos(turn) > double(smoothCosine)) maxTurn = std::max(maxTurn, turn);
     }
     return float(maxTurn);
 }

@@ -14,7 +14,7 @@ namespace bilayer::detail {
 /// The maximum turn at the smooth edges of triangles; 0 if there are none [rad].
 float maxSmoothTurn(std::span<const Triangle> triangles);
 
-/// The same of the triangle that is nearest to a point of its mesh [m]. 0 if none is within two voxels.
+/// The same of the edges of the triangle that is nearest to a point of its mesh [m]. 0 if none is within two voxels.
 float smoothTurnAt(const MeshTree& mesh, const glm::vec3& point);
 
 }  // namespace bilayer::detail

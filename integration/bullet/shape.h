@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A Bullet collision shape for any concave body: it collides by the signed distance field of its mesh.
 //
-// Written for Bullet 3.24 as packaged: single precision, no patches. docs/contacts.md describes the pipeline.
+// Written for Bullet 3.24 as packaged: single precision, no patches. docs/contacts/finding.md describes the pipeline.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>

@@ -66,7 +66,7 @@ void requirePositive(double value, const char* name) {
 
 void requireVoxelSize(double value, const char* name) {
     requirePositive(value, name);
-    bilayer::detail::checkVoxelSize(float(value), name);
+    bilayer::detail::checkVoxelSize(value, name);
 }
 
 void requireNotNegative(double value, const char* name) {

@@ -54,12 +54,15 @@ void setVoxelSize(const Keywords& keywords, const Mesh& mesh, const LevelSet* ol
     if ((size && resolution) || (!size && !resolution && !old))
         throw std::invalid_argument(
             fmt::format("voxel_size, resolution: expected {} one of them", old ? "at most" : "exactly"));
-    if (size)
+    if (size) {
+        requireVoxelSize(*size, "voxel_size");
         options.voxelSize = float(*size);
-    else if (resolution)
+    } else if (resolution) {
+        if (old && !(bounds(mesh).longestSide() > 0)) throw std::invalid_argument("old_mesh: the mesh has no extent");
         options.voxelSize = voxelSizeFor(mesh, float(*resolution));
-    else
+    } else {
         options.voxelSize = float(old->voxelSize());
+    }
 }
 
 void setBand(const Keywords& keywords, BuildOptions& options) {

@@ -11,13 +11,14 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <typeinfo>
 #include <vector>
 
 namespace bilayer::python {
 namespace {
 
-/// What errors of the libraries are about that do not begin with an argument: the new one of two. Of functions without
-/// these arguments, the first one: the mesh of build().
+/// The argument that an error is about if the error names none: the new one of two meshes, or the body. In other
+/// functions it is the first argument, as the mesh of build().
 constexpr std::array<std::string_view, 2> defaultSubjects{"new_mesh", "body"};
 
 // The name of an option in the libraries: "voxelSize" of "voxel_size".
@@ -55,6 +56,14 @@ std::string namedMessage(std::string message, const std::vector<std::string>& na
     return names.empty() || names[0] == "self" ? message : fmt::format("{}: {}", names[0], message);
 }
 
+// Paths in messages may have bytes that are not UTF-8.
+[[noreturn]] void raise(PyObject* type, const std::string& message) {
+    const auto text = py::reinterpret_steal<py::object>(
+        PyUnicode_DecodeUTF8(message.data(), Py_ssize_t(message.size()), "backslashreplace"));
+    PyErr_SetObject(type, text.ptr());
+    throw py::error_already_set();
+}
+
 // "name(a, b=1)" of a docstring.
 std::string_view signatureOf(std::string_view doc) {
     int depth = 0;
@@ -71,7 +80,10 @@ void rethrowNamed(const std::vector<std::string>& names) {
     try {
         throw;
     } catch (const std::invalid_argument& error) {
-        throw py::value_error(namedMessage(error.what(), names));
+        raise(PyExc_ValueError, namedMessage(error.what(), names));
+    } catch (const std::runtime_error& error) {
+        if (typeid(error) != typeid(std::runtime_error)) throw;  // has a type of its own in Python
+        raise(PyExc_RuntimeError, error.what());
     }
 }
 

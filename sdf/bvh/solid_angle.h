@@ -13,7 +13,7 @@ namespace bilayer::detail {
 
 struct SolidAngle {
     double value;  ///< [sr]
-    bool jumps;    ///< the apex lies on the triangle, up to rounding: the angle is 2 pi or -2 pi
+    bool jumps;    ///< the apex lies on the triangle or an edge of it, up to rounding: the angle jumps there
 };
 
 // Most triangles are small and far: a series of the inverse tangent is then exact, and faster than std::atan2.
@@ -29,7 +29,7 @@ inline SolidAngle solidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm
     const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c), product = la * lb * lc;
     const double above = glm::dot(a, glm::cross(b, c));
     const double below = product + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
-    return {2 * angleOf(above, below), below <= 0 && std::abs(above) <= flat * product};
+    return {2 * angleOf(above, below), below <= flat * product && std::abs(above) <= flat * product};
 }
 
 }  // namespace bilayer::detail

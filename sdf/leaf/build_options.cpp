@@ -36,17 +36,17 @@ void checkWidth(const char* option, float voxels, float voxelSize) {
 
 }  // namespace
 
-void checkVoxelSize(float voxelSize, const char* option) {
+void checkVoxelSize(double voxelSize, const char* option) {
     double scale = unitStep;
-    if (double(voxelSize) > maxStoredVoxel) {
-        while (double(voxelSize) / scale > maxStoredVoxel) scale *= unitStep;
+    if (voxelSize > maxStoredVoxel) {
+        while (voxelSize / scale > maxStoredVoxel) scale *= unitStep;
         throw std::invalid_argument(
             fmt::format("{} {:g} is above {:g}, the largest that a field may have: scale the mesh by {:g}, so "
                         "that voxels are {:g}",
-                        option, voxelSize, maxStoredVoxel, 1 / scale, double(voxelSize) / scale));
+                        option, voxelSize, maxStoredVoxel, 1 / scale, voxelSize / scale));
     }
-    if (voxelSize >= minVoxelSize) return;
-    while (scale * double(voxelSize) < double(minVoxelSize)) scale *= unitStep;
+    if (voxelSize >= double(minVoxelSize)) return;
+    while (scale * voxelSize < double(minVoxelSize)) scale *= unitStep;
     throw std::invalid_argument(
         fmt::format("{} {:g} is below {:g}, the smallest that OpenVDB takes: scale the mesh by {:g}{}, so that "
                     "voxels are {:g}",

@@ -17,7 +17,7 @@ inline constexpr float maxWidthVoxels = 1000;
 
 /// Throws std::invalid_argument for voxels that fields may not have; the text names the option and the scale that
 /// helps.
-void checkVoxelSize(float voxelSize, const char* option = "voxelSize");
+void checkVoxelSize(double voxelSize, const char* option = "voxelSize");
 
 /// Throws std::invalid_argument that names an option out of range.
 void checkOptions(const BuildOptions& options);

@@ -72,7 +72,7 @@ void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& o
     const Bounds& box = extent.box;
     const double h = options.voxelSize;
     const auto refuse = [&](const std::string& why) {
-        throw std::invalid_argument(fmt::format("voxelSize is too small for this mesh, {:g} voxels long: {}",
+        throw std::invalid_argument(fmt::format("voxelSize {:g} is too small for this mesh, {:g} voxels long: {}", h,
                                                 double(box.longestSide()) / h, why));
     };
     double cubes = 1;

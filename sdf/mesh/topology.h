@@ -72,6 +72,18 @@ struct Topology {
         }
     }
 
+    /// Calls visit(from, to, count) for each edge that is used more often in one direction than in the other, by
+    /// `count`.
+    template <class Visit>
+    void forEachUnbalancedEdge(Visit visit) const {
+        forEachEdge([&](std::span<const EdgeUse> uses) {
+            int excess = 0;
+            for (const EdgeUse& use : uses) excess += use.direction();
+            if (excess > 0) visit(uses[0].low, uses[0].high, unsigned(excess));
+            if (excess < 0) visit(uses[0].high, uses[0].low, unsigned(-excess));
+        });
+    }
+
   private:
     // `first`: for each vertex, the first one of equal coordinates; empty: each vertex itself
     Topology(const Mesh& mesh, const LargeArray<unsigned>& first, Progress* progress);

@@ -119,8 +119,8 @@ class ColumnNumbers {
     /// Returns a column's number below the leaf; in all of it, if the column is not crossed.
     std::int32_t below(std::size_t column) const { return winding_[column]; }
 
-    /// Advances a column to the leaf's top, and calls visit(k, number) for each of its voxels. To be called once for
-    /// each column that is crossed.
+    /// Advances a column to the leaf's top, and calls visit(k, number) for each of its voxels. Call it once for each
+    /// column that is crossed; others may be climbed too.
     template <class Visit>
     void climb(std::size_t column, const Visit& visit) {
         std::int32_t& winding = winding_[column];

@@ -16,6 +16,7 @@
 
 #include "sdf/base/openvdb.h"
 #include "sdf/bvh/winding_number.h"
+#include "sdf/mesh/boundary_loops.h"
 #include "sdf/mesh/topology.h"
 
 namespace bilayer::detail {
@@ -29,73 +30,21 @@ constexpr double maxDeviation = 0.25;
 // Distance from a fill triangle at which winding numbers are evaluated, on both sides [sqrt of its area].
 constexpr double sampleOffset = 1e-3;
 
-using Loop = std::vector<unsigned>;  // vertices
+using Loop = BoundaryLoops::Loop;
 using Lid = std::vector<glm::uvec3>;
 
-// Edges without an opposite edge, in the direction that the added triangles must use.
-class MissingEdges {
-  public:
-    explicit MissingEdges(const Mesh& mesh) : mesh_(mesh), next_(mesh.points.size()) {
-        Topology(mesh).forEachEdge([&](std::span<const EdgeUse> uses) {
-            int excess = 0;
-            for (const EdgeUse& use : uses) excess += use.direction();
-            const unsigned from = excess > 0 ? uses[0].high : uses[0].low, to = excess > 0 ? uses[0].low : uses[0].high;
-            next_[from].insert(next_[from].end(), std::size_t(std::abs(excess)), to);
-        });
-    }
-
-    std::vector<unsigned> vertices() const {
-        std::vector<unsigned> vertices;
-        for (unsigned v = 0; v < next_.size(); ++v)
-            if (!next_[v].empty()) vertices.push_back(v);
-        return vertices;
-    }
-
-    // At every vertex the counts of incoming and outgoing edges are equal, so the edges form closed loops. A path that
-    // returns to one of its own vertices has completed a loop.
-    std::vector<Loop> takeLoops() {
-        std::vector<Loop> loops;
-        std::vector<std::size_t> places(next_.size(), none);  // of vertices on the path
-        Loop path;
-        for (unsigned start = 0; start < next_.size(); ++start)
-            for (unsigned vertex = start; !next_[vertex].empty() || !path.empty(); vertex = take(path)) {
-                if (places[vertex] != none) {
-                    loops.emplace_back(path.begin() + std::ptrdiff_t(places[vertex]), path.end());
-                    for (const unsigned v : loops.back()) places[v] = none;
-                    path.resize(path.size() - loops.back().size());
-                    if (next_[vertex].empty()) break;
-                }
-                places[vertex] = path.size();
-                path.push_back(vertex);
-            }
-        return loops;
-    }
-
-  private:
-    static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
-
-    glm::dvec3 directionOf(unsigned from, unsigned to) const {
-        return glm::normalize(glm::dvec3(mesh_.points[to]) - glm::dvec3(mesh_.points[from]));
-    }
-
-    // Takes the edge at the end of a path that turns back the most, which leads to the opposite side of a crack.
-    unsigned take(const Loop& path) {
-        auto& out = next_[path.back()];
-        auto best = out.begin();
-        if (path.size() > 1 && out.size() > 1) {
-            const glm::dvec3 back = directionOf(path.back(), path[path.size() - 2]);
-            const auto cosine = [&](unsigned to) { return glm::dot(directionOf(path.back(), to), back); };
-            best =
-                std::max_element(out.begin(), out.end(), [&](unsigned a, unsigned b) { return cosine(a) < cosine(b); });
-        }
-        const unsigned to = *best;
-        out.erase(best);
-        return to;
-    }
-
-    const Mesh& mesh_;
-    std::vector<std::vector<unsigned>> next_;
-};
+// Of the edges at the end of a path, the one that turns back the most: it leads to the opposite side of a crack.
+std::size_t backMost(const Mesh& mesh, const Loop& path, const Loop& ends) {
+    if (path.size() < 2) return 0;
+    const auto directionTo = [&](unsigned to) {
+        return glm::normalize(glm::dvec3(mesh.points[to]) - glm::dvec3(mesh.points[path.back()]));
+    };
+    const glm::dvec3 back = directionTo(path[path.size() - 2]);
+    const auto cosine = [&](unsigned to) { return glm::dot(directionTo(to), back); };
+    const auto best =
+        std::max_element(ends.begin(), ends.end(), [&](unsigned a, unsigned b) { return cosine(a) < cosine(b); });
+    return std::size_t(best - ends.begin());
+}
 
 // Merges vertices with equal coordinates, and boundary vertices that are closer together than the crack width. Keeps
 // the vertices of one triangle separate.
@@ -277,10 +226,11 @@ class CapRemoval {
 }  // namespace
 
 FilledMesh fillHoles(Mesh mesh, double crack) {
-    const std::vector<unsigned> rim = MissingEdges(mesh).vertices();
+    const std::vector<unsigned> rim = BoundaryLoops(mesh).vertices();
     if (rim.empty()) return {std::move(mesh)};
     Mesh joined = withJoinedRims(mesh, rim, crack);
-    const std::vector<Loop> loops = MissingEdges(joined).takeLoops();
+    const std::vector<Loop> loops = BoundaryLoops(joined).takeLoops(
+        [&](const Loop& path, const Loop& ends) { return backMost(joined, path, ends); });
     const WindingNumber winding(joined);
     const std::size_t given = joined.triangles.size();
     FilledMesh filled;
@@ -293,7 +243,7 @@ FilledMesh fillHoles(Mesh mesh, double crack) {
     filled.loops = loops.size() - filled.openLoops;
     joined.triangles.insert(joined.triangles.end(), lids.begin(), lids.end());
     CapRemoval(joined, given, crack).run();
-    filled.changed = filled.loops > 0 || MissingEdges(joined).vertices().size() < rim.size();
+    filled.changed = filled.loops > 0 || BoundaryLoops(joined).vertices().size() < rim.size();
     filled.mesh = filled.changed ? std::move(joined) : std::move(mesh);
     return filled;
 }

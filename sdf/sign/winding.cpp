@@ -54,7 +54,7 @@ void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths&
             signEmptyCells(query, brick, found.local());
         });
     }
-    signLeaves(leaves, mesh, winding, widths, closed, progress);
+    signLeaves(leaves, mesh, query, widths);
     std::vector<openvdb::CoordBBox> inside;
     for (const auto& boxes : found) inside.insert(inside.end(), boxes.begin(), boxes.end());
     assemble(grid, inside, widths, progress);

@@ -13,7 +13,7 @@
 
 #include "sdf/base/progress.h"
 #include "sdf/bvh/winding_in_ball.h"
-#include "sdf/mesh/hole_caps.h"
+#include "sdf/mesh/closing_triangles.h"
 #include "sdf/sign/column_crossings.h"
 
 namespace bilayer::detail {
@@ -22,82 +22,70 @@ namespace {
 /// Sums of estimates are rounded by less.
 constexpr double rounding = 1e-9;
 
-glm::dvec3 position(const openvdb::Coord& voxel, double h) {
-    return glm::dvec3(voxel.x(), voxel.y(), voxel.z()) * h;
-}
-
-// A cube of voxels as a ball around their centres [m].
-struct Cube {
-    openvdb::Coord origin;
-    int side;
-    double h;
-    glm::dvec3 centre() const { return position(origin, h) + 0.5 * (side - 1) * h; }
-    double radius() const { return std::sqrt(3.0) / 2 * (side - 1) * h * (1 + 1e-9); }
-};
-
-class OpenLeaf {
+/// The sides of a leaf's voxels by the winding number of an open mesh: the one of the closed mesh, less the one of the
+/// closing triangles.
+class OpenMeshSides {
   public:
     using Numbers = std::array<std::int32_t, blockVoxels>;
 
-    /// @param closed  winding numbers of the mesh and its caps
-    OpenLeaf(const WindingNumber& winding, const WindingNumber& caps, const BandLeaf& leaf, const Numbers& closed,
-             double h)
-        : winding_(winding), caps_(caps), leaf_(leaf), closed_(closed), h_(h) {}
-
-    BlockMask inside() {
-        sign({leaf_.origin(), blockSide, h_});
-        return inside_;
+    /// @param query   of the open mesh
+    /// @param closed  winding numbers of the closed mesh
+    OpenMeshSides(const WindingQuery& query, const WindingNumber& closing, const BandLeaf& leaf, const Numbers& closed)
+        : query_(query), closing_(closing), closed_(closed) {
+        find(leaf.origin(), blockSide);
     }
 
+    const BlockMask& inside() const { return inside_; }
+
   private:
-    void sign(const Cube& cube) {
-        const WindingInBall caps(caps_, cube.centre(), cube.radius());
+    void find(const openvdb::Coord& origin, int side) {
+        const double radius = std::sqrt(3.0) / 2 * (side - 1) * query_.voxelSize * (1 + 1e-9);
+        const WindingInBall closing(closing_, query_.centre(origin, side), radius);
         constexpr int octantSide = blockSide / 2;
-        if (cube.side > octantSide && caps.hasNear()) {
+        if (side > octantSide && closing.hasNear()) {
             for (int octant = 0; octant < 8; ++octant)
-                sign({cube.origin.offsetBy(octant / 4 * octantSide, octant / 2 % 2 * octantSide,
-                                           octant % 2 * octantSide),
-                      octantSide, h_});
+                find(origin.offsetBy(octant / 4 * octantSide, octant / 2 % 2 * octantSide, octant % 2 * octantSide),
+                     octantSide);
             return;
         }
-        for (int x = 0; x < cube.side; ++x)
-            for (int y = 0; y < cube.side; ++y)
-                for (int z = 0; z < cube.side; ++z) {
-                    const openvdb::Coord voxel = cube.origin.offsetBy(x, y, z);
+        for (int x = 0; x < side; ++x)
+            for (int y = 0; y < side; ++y)
+                for (int z = 0; z < side; ++z) {
+                    const openvdb::Coord voxel = origin.offsetBy(x, y, z);
                     const unsigned offset = BandLeaf::coordToOffset(voxel);
-                    if (isInside(caps, offset, position(voxel, h_))) set(inside_, offset);
+                    if (isInside(closing, offset, query_.position(voxel))) set(inside_, offset);
                 }
     }
 
-    bool isInside(const WindingInBall& caps, unsigned voxel, const glm::dvec3& point) const {
+    bool isInside(const WindingInBall& closing, unsigned voxel, const glm::dvec3& point) const {
         const auto aboveHalf = [&](const WindingNumber::Estimate& e) { return closed_[voxel] - e.value - 0.5; };
         const auto decides = [&](const WindingNumber::Estimate& e) {
             return std::abs(aboveHalf(e)) > e.error + rounding;
         };
-        const WindingNumber::Estimate coarse = caps.coarseEstimate(point);
+        const WindingNumber::Estimate coarse = closing.coarseEstimate(point);
         if (decides(coarse)) return aboveHalf(coarse) > 0;
-        const WindingNumber::Estimate fine = caps.estimate(point);
-        return decides(fine) ? aboveHalf(fine) > 0 : winding_.isInside(point);
+        const WindingNumber::Estimate fine = closing.estimate(point);
+        return decides(fine) ? aboveHalf(fine) > 0 : query_.winding.isInside(point);
     }
 
-    const WindingNumber &winding_, &caps_;
-    const BandLeaf& leaf_;
+    const WindingQuery& query_;
+    const WindingNumber& closing_;
     const Numbers& closed_;
-    const double h_;
     BlockMask inside_{};
 };
 
-// Calls visit(leaf, numbers) for each leaf, with the winding numbers of a closed mesh along its columns.
+// Calls visit(leaf, numbers, crossed) for each leaf: with the winding numbers of a closed mesh along its columns, and
+// the columns that are crossed.
 template <class Visit>
-void forEachLeaf(const std::vector<BandLeaf*>& leaves, const Mesh& closed, double h, Progress* progress,
+void forEachLeaf(const std::vector<BandLeaf*>& leaves, const Mesh& closed, const WindingQuery& query,
                  const Visit& visit) {
-    const ColumnCrossings columns(leaves, closed, h, false, progress);
+    const ColumnCrossings columns(leaves, closed, query.voxelSize, false, query.progress);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, columns.tiles()), [&](const auto& range) {
         ColumnCrossings::OfTile crossings;
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             ColumnNumbers numbers;
             columns.forEachLeaf(i, crossings, [&](BandLeaf& leaf, auto found, std::uint64_t) {
-                poll(progress);
+                poll(query.progress);
                 const std::uint64_t crossed = numbers.enter(leaf, found);
                 visit(leaf, numbers, crossed);
             });
@@ -118,31 +106,29 @@ void signClosed(BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t crossed, c
     signLeaf(leaf, inside, widths);
 }
 
-void signOpen(BandLeaf& leaf, ColumnNumbers& numbers, const WindingNumber& winding, const WindingNumber& caps,
+void signOpen(BandLeaf& leaf, ColumnNumbers& numbers, const WindingQuery& query, const WindingNumber& closing,
               const BandWidths& widths) {
-    OpenLeaf::Numbers closed;
+    OpenMeshSides::Numbers closed;
     for (std::size_t column = 0; column < columnsPerLeaf; ++column)
         numbers.climb(column,
                       [&](int k, std::int32_t number) { closed[column * blockSide + std::size_t(k)] = number; });
-    signLeaf(leaf, OpenLeaf(winding, caps, leaf, closed, double(widths.voxelSize)).inside(), widths);
+    signLeaf(leaf, OpenMeshSides(query, closing, leaf, closed).inside(), widths);
 }
 
 }  // namespace
 
-void signLeaves(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, const WindingNumber& winding,
-                const BandWidths& widths, bool closed, Progress* progress) {
-    const auto h = double(widths.voxelSize);
-    std::vector<glm::uvec3> caps = closed ? std::vector<glm::uvec3>() : holeCaps(mesh, progress);
-    if (caps.empty())
-        return forEachLeaf(leaves, mesh, h, progress,
-                           [&](BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t crossed) {
-                               signClosed(leaf, numbers, crossed, widths);
-                           });
-    Mesh capped{mesh.points, std::move(caps)};
-    const WindingNumber ofCaps(capped, progress);
-    capped.triangles.insert(capped.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
-    forEachLeaf(leaves, capped, h, progress, [&](BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t) {
-        signOpen(leaf, numbers, winding, ofCaps, widths);
+void signLeaves(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, const WindingQuery& query,
+                const BandWidths& widths) {
+    std::vector<glm::uvec3> closing = query.slope ? closingTriangles(mesh, query.progress) : std::vector<glm::uvec3>();
+    if (closing.empty())
+        return forEachLeaf(leaves, mesh, query, [&](BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t crossed) {
+            signClosed(leaf, numbers, crossed, widths);
+        });
+    Mesh closed{mesh.points, std::move(closing)};
+    const WindingNumber ofClosing(closed, query.progress);
+    closed.triangles.insert(closed.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
+    forEachLeaf(leaves, closed, query, [&](BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t) {
+        signOpen(leaf, numbers, query, ofClosing, widths);
     });
 }
 

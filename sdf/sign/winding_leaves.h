@@ -6,18 +6,16 @@
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
-#include "sdf/bvh/winding_number.h"
 #include "sdf/leaf/band.h"
 #include "sdf/sign/octree_cells.h"
+#include "sdf/sign/winding_query.h"
 
 namespace bilayer::detail {
 
 /// Signs the voxels of leaves. The winding number of a closed mesh is the sum of the crossings of a column of voxels
-/// below. An open mesh is closed by caps, and the winding number of the caps is subtracted.
-/// @param winding   of the mesh
-/// @param closed    as in signByWinding()
-/// @param progress  polled for cancellation, unless null
-void signLeaves(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, const WindingNumber& winding,
-                const BandWidths& widths, bool closed, Progress* progress);
+/// below. Triangles are added to an open mesh until it is closed, and their winding number is subtracted.
+/// @param query  of the mesh, with a slope if the mesh is open
+void signLeaves(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, const WindingQuery& query,
+                const BandWidths& widths);
 
 }  // namespace bilayer::detail

@@ -6,7 +6,6 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <limits>
-#include <span>
 
 #include "sdf/bvh/median_tree.h"
 #include "sdf/mesh/topology.h"
@@ -14,12 +13,9 @@
 namespace bilayer::detail {
 
 WindingSlope::WindingSlope(const Mesh& mesh, Progress* progress) {
-    Topology(mesh, progress).forEachEdge([&](std::span<const EdgeUse> uses) {
-        int excess = 0;
-        for (const EdgeUse& use : uses) excess += use.direction();
-        const glm::vec3 from = mesh.points[uses[0].low], to = mesh.points[uses[0].high];
-        if (excess != 0)
-            edges_.push_back({from, to, std::abs(double(excess)), 0.5f * (from + to), std::uint32_t(edges_.size())});
+    Topology(mesh, progress).forEachUnbalancedEdge([&](unsigned first, unsigned second, unsigned count) {
+        const glm::vec3 from = mesh.points[first], to = mesh.points[second];
+        edges_.push_back({from, to, double(count), 0.5f * (from + to), std::uint32_t(edges_.size())});
     });
     if (edges_.empty()) return;
     nodes_.resize(medianTreeNodes(edges_.size(), leafEdges));

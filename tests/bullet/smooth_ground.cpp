@@ -90,6 +90,59 @@ TEST_CASE("Bodies keep their energy over waves of triangles of any size, at any 
     CHECK(sum < 0.1 * sumWithout);
 }
 
+TEST_CASE("A ball that rolls over flat triangles keeps its energy") {
+    const unsigned seed = test::seed();
+    Random random(seed);
+    Shape ball(exactSphere(0.25f, voxel));
+    const demo::Waves flat({0, 0.25f});
+    const auto ground = flat.shape();
+    for (const float steps : {60.f, 120.f, 240.f}) {
+        const float y = float(random(-1, 1)), speed = float(random(1, 3));
+        const auto lossOf = [&](bool smoothGround) {
+            Slider slider(*ground, ball, {-5, y, 0.25f}, {speed, 0, 0});
+            slider.body->setFriction(1);
+            slider.body->setAngularVelocity({0, speed / 0.25f, 0});
+            const WorldExtensions extensions(slider.world.dynamics, {.smoothGround = smoothGround});
+            slider.run(0.25f, steps);
+            const double start = slider.energy(), kinetic = kineticEnergyOf(*slider.body);
+            slider.run(1.5f, steps);
+            return (start - slider.energy()) / kinetic;
+        };
+        CAPTURE(seed, steps, y, speed);
+        CHECK(std::abs(lossOf(true)) < 0.02);
+        CHECK(lossOf(false) > 0.1);
+    }
+}
+
+TEST_CASE("Ground that moves gives bodies nothing") {
+    Shape ball(exactSphere(0.25f, voxel));
+    const demo::Waves waves({0.1f, 0.25f});
+    const auto ground = waves.shape();
+    const auto end = [&](bool smoothGround) {
+        Slider slider(*ground, ball, {-5, 0.3f, 0.35f}, {2, 0, 0});
+        btCollisionObject* const mesh = slider.world.dynamics.getCollisionObjectArray()[0];
+        mesh->setCollisionFlags(mesh->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+        mesh->setActivationState(DISABLE_DEACTIVATION);
+        const WorldExtensions extensions(slider.world.dynamics, {.smoothGround = smoothGround});
+        for (int i = 0; i < 120; ++i) {
+            mesh->getWorldTransform().getOrigin().setZ(0.001f * float(i));
+            slider.run(1.f / 120, 120);
+        }
+        return slider.body->getWorldTransform();
+    };
+    CHECK(end(true) == end(false));
+}
+
+TEST_CASE("The turn at a point of a mesh is that of the edges of its triangle, if they are smooth") {
+    const auto turnAt = [](const Mesh& mesh, const glm::vec3& point) {
+        return glm::degrees(detail::smoothTurnAt(detail::MeshTree(mesh, voxel), point));
+    };
+    CHECK(turnAt(shapes::cylinder(0.2f, 0.4f, 96), {0.2f, 0.01f, 0.05f}) == Approx(3.75f).epsilon(1e-3));
+    CHECK(turnAt(shapes::cylinder(0.2f, 0.4f, 12), {0.2f, 0.01f, 0.05f}) == 0);
+    CHECK(turnAt(shapes::box({0.3f, 0.3f, 0.1f}), {0.1f, 0.05f, 0.1f}) == 0);
+    CHECK(turnAt(shapes::sphere(0.2f), {0, 0.5f, 0}) == 0);  // not near its surface
+}
+
 TEST_CASE("A body that drops on waves loses its speed there") {
     const unsigned seed = test::seed();
     Random random(seed);

@@ -235,11 +235,11 @@ TEST_CASE("Shapes refuse what has no volume, and name it") {
         CHECK(refusal([&] { ContactShape::cone(bad, 1); }).find("radius") != std::string::npos);
         if (!(bad < 0))
             CHECK(refusal([&] { ContactShape::plane({0, 0, bad}, 0); }).find("normal") != std::string::npos);
-        CHECK(refusal([&] { ContactShape::spheres({{{{0, 0, 0}, bad}}}); }).find("radius") != std::string::npos);
+        CHECK(refusal([&] { ContactShape::spheres({{{{0, 0, 0}, bad}}}); }).find("radi") != std::string::npos);
         CHECK(refusal([&] { contactsOf({block(), {}, bad}, {block()}, {}); }).find("scale") != std::string::npos);
     }
     CHECK(refusal([] { ContactShape::capsule(1, -1); }).find("half height") != std::string::npos);
-    CHECK(refusal([] { ContactShape::spheres({}); }).find("radius") != std::string::npos);
+    CHECK(refusal([] { ContactShape::spheres({}); }).find("radii") != std::string::npos);
     CHECK(refusal([&] { ContactShape::plane({0, 0, 1}, nan); }).find("offset") != std::string::npos);
     CHECK(refusal([] { ContactShape::triangles({}); }).find("visit") != std::string::npos);
     const std::vector<glm::vec3> flat{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.3f, 0.2f, 0}};

@@ -99,6 +99,11 @@ TEST_CASE("bodies keep their speed over waves of triangles") {
         options.cell = GENERATE(0.3f, 0.6f);
         judgeOnce(demo::terrain(options));
     }
+    SECTION("bodies that roll") {
+        options.rolls = true;
+        options.height = GENERATE(0.f, 0.01f, 0.1f);
+        judgeOnce(demo::terrain(options));
+    }
     SECTION("large triangles") {
         options.height = 0.02f;
         options.cell = 2.4f;

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bilayer/sdf/build.h>
 
-#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <glm/geometric.hpp>
 #include <random>
 
@@ -56,17 +53,6 @@ Errors errors(const LevelSet& field, Truth truth, std::size_t every = 1) {
     result.count = voxels.size();
     result.mean /= double(voxels.size());
     return result;
-}
-
-bool sameBytes(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
-    if (!a.tree().hasSameTopology(b.tree()) || a.background() != b.background()) return false;
-    auto other = b.tree().cbeginLeaf();
-    for (auto leaf = a.tree().cbeginLeaf(); leaf; ++leaf, ++other)
-        if (std::memcmp(leaf->buffer().data(), other->buffer().data(), sizeof(float) * blockVoxels) != 0) return false;
-    auto otherValue = b.cbeginValueAll();
-    for (auto value = a.cbeginValueAll(); value; ++value, ++otherValue)
-        if (value.getValue() != otherValue.getValue() || value.getCoord() != otherValue.getCoord()) return false;
-    return true;
 }
 
 }  // namespace
@@ -183,44 +169,6 @@ TEST_CASE("OpenVDB finds a level set in it") {
         CHECK(field.grids().distance->getGridClass() == openvdb::GRID_LEVEL_SET);
         CHECK(field.grids().distance->getName() == "distance");
     }
-}
-
-TEST_CASE("the bytes do not depend on the number of threads") {
-    const Mesh mesh = shapes::torusKnot(2, 3, 1, 0.2f);
-    BuildOptions options{.voxelSize = voxelSizeFor(mesh, 150), .threads = 1};
-    const LevelSet one = build(mesh, options);
-    for (const int threads : {2, 3, 8, 0}) {
-        options.threads = threads;
-        CAPTURE(threads);
-        CHECK(sameBytes(*one.grids().distance, *build(mesh, options).grids().distance));
-    }
-}
-
-TEST_CASE("a build limits its own threads only") {
-    const auto allowed = [] { return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism); };
-    const std::size_t before = allowed();
-    std::size_t during = 0;
-    build(shapes::sphere(1, 2), {.voxelSize = 0.1f, .threads = 1, .progress = [&](double) {
-                                     during = allowed();
-                                     return true;
-                                 }});
-    CHECK(during == before);
-}
-
-TEST_CASE("many builds on a given number of threads take no more memory than a few") {
-    const auto residentBytes = [] {
-        std::size_t all = 0, resident = 0;
-        std::ifstream("/proc/self/statm") >> all >> resident;
-        return double(resident) * double(sysconf(_SC_PAGESIZE));
-    };
-    const Mesh mesh = shapes::sphere(1, 1);
-    const auto buildSome = [&](int count) {
-        for (int i = 0; i < count; ++i) build(mesh, {.voxelSize = 0.5f, .threads = 2});
-    };
-    buildSome(300);
-    const double before = residentBytes();
-    buildSome(1000);
-    CHECK(residentBytes() - before < 3e6);
 }
 
 TEST_CASE("a shift by whole blocks keeps the bytes") {

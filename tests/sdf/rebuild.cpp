@@ -212,7 +212,7 @@ TEST_CASE("a rebuild refuses what does not belong together, by name") {
     auto fewer = moved;
     const std::uint32_t first = fewer[1];
     fewer.erase(fewer.begin() + 1);
-    refused(before, after, fewer, options, "triangle " + std::to_string(first) + " ");
+    refused(before, after, fewer, options, "moved lacks triangle " + std::to_string(first) + ",");
     refused(before, after, {std::uint32_t(before.triangles.size())}, options, "there are only");
     Mesh shorter = after;
     shorter.triangles.pop_back();

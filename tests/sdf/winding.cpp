@@ -5,6 +5,7 @@
 
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
 #include <random>
 
 #include <bilayer/sdf/build.h>
@@ -141,6 +142,7 @@ TEST_CASE("the winding number in a ball is that of brute force within its bound"
                              soup(glm::vec3(0.5f), 3000, seed), shapes::box({1, 0.5f, 0.01f}, 3)}) {
         const WindingNumber winding(mesh);
         int decided = 0;
+        double bounds = 0;
         for (int i = 0; i < 200; ++i) {
             const glm::dvec3 centre(uniform(random), uniform(random), uniform(random));
             const double radius = std::pow(10, -3 * unit(random));
@@ -156,10 +158,28 @@ TEST_CASE("the winding number in a ball is that of brute force within its bound"
                 REQUIRE(std::abs(coarse.value - exact) <= coarse.error + 1e-10);
                 REQUIRE(coarse.error > estimate.error - 1e-10);
                 decided += estimate.error < std::abs(estimate.value - 0.5);
+                bounds += estimate.error / 2000;
             }
         }
         CHECK(decided > 1800);  // of 2000 sides
+        CHECK(bounds < 0.2);
     }
+}
+
+TEST_CASE("the winding number in a ball is unknown on triangles and on edges between them") {
+    const Mesh square{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+    const WindingNumber winding(square);
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_int_distribution<int> hundredths(1, 99);
+    for (int i = 1; i < 100; ++i)
+        for (const glm::dvec2 at : {glm::dvec2(i, i), glm::dvec2(i, hundredths(random))}) {
+            const glm::dvec3 p(at / 100.0, 0);
+            CAPTURE(p.x, p.y);
+            REQUIRE(WindingInBall(winding, p, 0.01).estimate(p).error >= 0.5);
+            REQUIRE(WindingInBall(winding, p, 0.01).coarseEstimate(p).error >= 0.5);
+        }
 }
 
 TEST_CASE("the expansion about a far cluster is of second order") {

@@ -26,7 +26,7 @@ namespace {
 
 // Impacts up to this multiple of the energy that edges of the ground and of the body can take from it are given back. A
 // block touches several edges at once and rocks; its later impacts take what the earlier ones have put into that.
-constexpr float maxEdges = 4;
+constexpr float maxEnergyRatio = 4;
 // A body that is slower along the ground than this may be at rest [speeds that gravity adds in a step].
 constexpr float restSpeed = 2;
 // Approach velocities below this fraction of the speed along the ground are rounding.
@@ -37,6 +37,11 @@ constexpr float maxChange = 0.2f;
 bool isTriangles(const btCollisionShape& shape) {
     const int type = shape.getShapeType();
     return shape.isConcave() && type != FAST_CONCAVE_MESH_PROXYTYPE && type != STATIC_PLANE_PROXYTYPE;
+}
+
+// Bullet calls bodies static, too, that move by their poses.
+bool standsStill(const btCollisionObject& object) {
+    return object.isStaticObject() && !object.isKinematicObject();
 }
 
 /// The ground's triangles in the bounding box of a body, in the ground's coordinates.
@@ -74,7 +79,7 @@ float turnOf(const btCollisionShape& shape, const btVector3& place) {
 }  // namespace
 
 float FacetImpact::loss(float turn) const {
-    const float caused = speed * std::tan(turn) * std::sqrt(maxEdges * mobility), ratio = caused / before;
+    const float caused = speed * std::tan(turn) * std::sqrt(maxEnergyRatio * mobility), ratio = caused / before;
     return -0.5f * impulse * (before + after) * std::min(ratio * ratio, 1.f);
 }
 
@@ -130,7 +135,7 @@ void SmoothGround::afterStep(float seconds) {
         const btCollisionObject *object = manifold.getBody0(), *ground = manifold.getBody1();
         if (object->isStaticObject()) std::swap(object, ground);
         btRigidBody* const body = activeDynamicBody(const_cast<btCollisionObject&>(*object));
-        if (!body || !ground->isStaticObject() || !isTriangles(*ground->getCollisionShape())) continue;
+        if (!body || !standsStill(*ground) || !isTriangles(*ground->getCollisionShape())) continue;
         if (holdsField(*body->getCollisionShape())) losses[body] += lossIn(manifold, {body, ground}, seconds);
     }
     for (const auto& [body, loss] : losses) {

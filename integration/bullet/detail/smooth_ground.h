@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Smooth ground: bodies that slide or roll over triangles keep their energy.
+// Tested by tests/bullet/smooth_ground.cpp.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Triangles that close an open mesh.
-// Tested by tests/sdf/hole_caps.cpp.
+// Tested by tests/sdf/closing_triangles.cpp.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -13,9 +13,10 @@ namespace bilayer::detail {
 class Progress;
 
 /// Returns triangles that close a mesh: with them, each edge is used equally often in both directions. Vertices with
-/// equal coordinates count as one. They may intersect each other and the mesh. Each loop of n boundary edges gets n - 2
+/// equal coordinates count as one. The triangles may intersect each other and the
+/// mesh. Each loop of n boundary edges gets n - 2
 /// triangles, most of them small: a loop is closed by cutting off every second vertex, again and again.
 /// @param progress  polled, unless null
-std::vector<glm::uvec3> holeCaps(const Mesh& mesh, Progress* progress = nullptr);
+std::vector<glm::uvec3> closingTriangles(const Mesh& mesh, Progress* progress = nullptr);
 
 }  // namespace bilayer::detail
