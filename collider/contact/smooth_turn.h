@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a surface of triangles turns at its smooth edges: those with a turn below 20 degrees, which stand for a
-// smooth surface. Tested by tests/bullet/smooth_ground.cpp.
+// How far a surface of triangles turns at its smooth edges, which have a turn below 20 degrees.
+// Tested by tests/bullet/smooth_ground.cpp.
 #pragma once
 
 #include <glm/vec3.hpp>

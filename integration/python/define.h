@@ -148,9 +148,8 @@ void defineReduce(py::class_<Class, Extra...>& type, const char* doc, Unpack unp
     defineStatic(type, doc, unpack);
     const std::string name(doc, std::string_view(doc).find('('));
     const py::object make = type.attr(name.c_str());
-    type.def("__reduce__", [make, pack](const Class& self) {
-        return py::make_tuple(make, py::make_tuple(pack(self)));
-    });
+    type.def("__reduce__",
+             [make, pack](const Class& self) { return py::make_tuple(make, py::make_tuple(pack(self))); });
 }
 
 /// The constructor of a class, from a function that makes an object. The docstring is that of the class.
