@@ -107,8 +107,8 @@ TEST_CASE("Balls roll on") {
     }
     // the loss at its facets, on each of which it lands. Those between points 1.4 voxels apart take about a sixth in
     // one second at 0.3 m/s. The ball must not be thrown up. At 3 m/s it rotates by half a radian per step and lifts by
-    // 1 to 2 mm, and by 3.1 mm for seed 4075818314; straight point displacements would lift it by 20 mm. At lower speeds
-    // it does not hop
+    // 1 to 2 mm, and by 3.1 mm for seed 4075818314; straight point displacements would lift it by 20 mm. At lower
+    // speeds it does not hop
     CHECK(kept > 0.75f);
     CHECK(highest < (speed < 2 ? 0.3f / 32 : 0.03f) * radius);
 }
