@@ -29,6 +29,13 @@
 namespace bilayer::python {
 namespace {
 
+// What visits the whole tree, without the GIL.
+template <auto count>
+std::uint64_t counted(const LevelSet& levelSet) {
+    const WithoutGil release;
+    return (levelSet.*count)();
+}
+
 using openvdb::Coord;
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
@@ -97,9 +104,9 @@ py::dict metadataOf(const LevelSet& levelSet) {
     all["origin"] = toArray(levelSet.origin());
     all["exterior_width"] = levelSet.exteriorWidth();
     all["interior_width"] = levelSet.interiorWidth();
-    all["active_voxels"] = levelSet.activeVoxels();
-    all["leaves"] = levelSet.leaves();
-    all["memory_bytes"] = levelSet.memoryBytes();
+    all["active_voxels"] = counted<&LevelSet::activeVoxels>(levelSet);
+    all["leaves"] = counted<&LevelSet::leaves>(levelSet);
+    all["memory_bytes"] = counted<&LevelSet::memoryBytes>(levelSet);
     all["method"] = levelSet.method();
     all["sign"] = levelSet.sign();
     all["sign_reason"] = levelSet.signReason();
@@ -311,8 +318,8 @@ void addLevelSet(py::module_& module) {
                                "Voxels with 0 <= distance < this are active.")
         .def_property_readonly("interior_width", &LevelSet::interiorWidth,
                                "Voxels with -this < distance < 0 are active.")
-        .def_property_readonly("active_voxels", &LevelSet::activeVoxels, "Number of voxels in the band.")
-        .def_property_readonly("memory_bytes", &LevelSet::memoryBytes, "Memory that all grids take, in bytes.")
+        .def_property_readonly("active_voxels", counted<&LevelSet::activeVoxels>, "Number of voxels in the band.")
+        .def_property_readonly("memory_bytes", counted<&LevelSet::memoryBytes>, "Memory that all grids take, in bytes.")
         .def_property_readonly("method", &LevelSet::method, "How distances were computed; '' if not known.")
         .def_property_readonly("sign", &LevelSet::sign,
                                "How the inside was found: 'normals', 'winding' or 'flood'; 'layers' for the method "
