@@ -89,6 +89,24 @@ TEST_CASE("Kinematic bodies push fields, and fields push bodies") {
     CHECK(pushed->getLinearVelocity().x() == Approx(0.8f).margin(0.02));
 }
 
+TEST_CASE("A kinematic bat drives an elastic ball away at twice its speed") {
+    static const auto ballCollider = exactSphere(0.1f, h / 5);
+    const float speed = GENERATE(1.f, 5.f, 20.f), start = GENERATE(range(0, 8)) / 8.f;
+    CAPTURE(speed, start);
+    btBoxShape plate({0.05f, 0.5f, 0.5f});
+    Shape ball(ballCollider);
+    World world;
+    world.dynamics.setGravity({0, 0, 0});
+    btRigidBody* bat = world.add(plate, 0, {-0.5f - start * step * speed, 0, 0});
+    makeKinematic(*bat);
+    btRigidBody* driven = world.add(ball, 1, {0, 0, 0});
+    driven->setActivationState(DISABLE_DEACTIVATION);
+    for (btRigidBody* body : {bat, driven}) body->setRestitution(1);
+    carry(world, *bat, {speed, 0, 0}, 1 / speed);
+    CHECK(driven->getLinearVelocity().x() == Approx(2 * speed).epsilon(0.01));
+    CHECK(driven->getWorldTransform().getOrigin().x() > bat->getWorldTransform().getOrigin().x() + 0.15f);
+}
+
 namespace {
 
 struct SoftWorld {

@@ -19,6 +19,7 @@
 #include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
 #include "integration/bullet/detail/pair_contacts.h"
+#include "integration/bullet/detail/velocity.h"
 
 namespace bilayer::bullet::detail {
 
@@ -37,11 +38,6 @@ constexpr float maxChange = 0.2f;
 bool isTriangles(const btCollisionShape& shape) {
     const int type = shape.getShapeType();
     return shape.isConcave() && type != FAST_CONCAVE_MESH_PROXYTYPE && type != STATIC_PLANE_PROXYTYPE;
-}
-
-// Bullet calls bodies static, too, that move by their poses.
-bool standsStill(const btCollisionObject& object) {
-    return object.isStaticObject() && !object.isKinematicObject();
 }
 
 /// The ground's triangles in the bounding box of a body, in the ground's coordinates.

@@ -35,8 +35,12 @@ Velocity velocityOf(const btMultiBodyLinkCollider& collider) {
 
 }  // namespace
 
+bool standsStill(const btCollisionObject& object) {
+    return object.isStaticObject() && !object.isKinematicObject();
+}
+
 Velocity velocityOf(const btCollisionObject& object) {
-    if (object.isStaticObject()) return {};
+    if (standsStill(object)) return {};
     if (const btRigidBody* body = btRigidBody::upcast(&object))
         return {body->getCenterOfMassPosition(), body->getLinearVelocity(), body->getAngularVelocity()};
     if (const auto* link = btMultiBodyLinkCollider::upcast(&object); link && link->m_multiBody)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Velocities of the objects of a world.
-// Tested by tests/bullet/multibodies.cpp.
+// Tested by tests/bullet/multibodies.cpp and tests/bullet/moving.cpp.
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
@@ -17,8 +17,11 @@ struct Velocity {
     btVector3 at(const btVector3& point) const { return linear + angular.cross(point - centre); }
 };
 
-/// The current velocity of an object. Zero for static objects and objects that are not bodies. Kinematic bodies move as
-/// given by their poses of the last steps.
+/// Whether an object is static and is not moved by its poses: Bullet also calls a kinematic body without mass static.
+bool standsStill(const btCollisionObject& object);
+
+/// The current velocity of an object. Zero for objects that stand still and objects that are not bodies. Kinematic
+/// bodies move as given by their poses of the last steps.
 Velocity velocityOf(const btCollisionObject& object);
 
 /// The acceleration of a rigid body's centre by the forces applied so far in this step [m/s^2]; 0 for all other
