@@ -13,7 +13,8 @@ TABLE = re.compile(r"^(\|[^\n]*)\n\|[ :|-]+\|\n((?:\|[^\n]*\n)*)", re.M)
 FIGURE = re.compile(r"\b([\d.,]*\d)(?: to ([\d.,]*\d))? (?:ns|us|ms|(?:times|frames) (?:as (?:fast|long)|a second))\b")
 CELL = re.compile(r"[\d.,]+(?: to [\d.,]+)? (?:ns|us|ms|s|KB|MB|MiB|GiB)")  # a whole one of a table
 NUMBER = re.compile(r"\d[\d,]*(?:\.\d+)?")
-LINK = re.compile(r"\]\(([\w./-]+\.md)(?:#[\w-]*)?\)")
+LINK = re.compile(r"\]\(([\w./-]+\.md)(?:#([\w-]*))?\)")
+HEADING = re.compile(r"^(#+) (.*)$", re.M)
 CODE = re.compile(r"^```.*?^```$", re.M | re.S)
 PARAGRAPH = re.compile(r"\n\s*\n|\n(?=- |\d+\. |\|)")  # between two of them, items of lists or rows of tables
 MEASURED = re.compile(r"\[(?:us|ms|s|KB|MB|MiB|%)\]|\bns a query\b|\btimes as fast\b|\bseconds\b")  # in the head of a table
@@ -45,15 +46,28 @@ def rounds_to(figure, number):
     return abs(float(figure.replace(",", "")) - float(number.replace(",", ""))) <= 0.5001 * 10.0**-digits
 
 
+def section(page, anchor):
+    """The text under the heading that an anchor names, without the headings at its level; all of the page without an anchor."""
+    if not anchor:
+        return page
+    for heading in HEADING.finditer(page):
+        level, title = heading.groups()
+        if re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") == anchor:
+            ends = (m.start() for m in HEADING.finditer(page, heading.end()) if len(m[1]) <= len(level))
+            return page[heading.end() : next(ends, len(page))]
+    return ""
+
+
 def faults_of_quotes(root, path):
-    """Times and ratios in the text of a page that no page of results has, or that come without a link to one."""
+    """Times and ratios in the text of a page that no section of results has, or that come without a link to it."""
     for paragraph in PARAGRAPH.split(CODE.sub("", path.read_text())):
         figures = [figure for match in FIGURE.finditer(paragraph) for figure in match.groups() if figure]
-        linked = [path.parent / link for link in LINK.findall(paragraph)]
-        numbers = NUMBER.findall("".join(page.read_text() for page in linked if is_results(root, page.resolve())))
+        linked = [(path.parent / link, anchor) for link, anchor in LINK.findall(paragraph)]
+        results = (section(page.read_text(), anchor) for page, anchor in linked if is_results(root, page.resolve()))
+        numbers = NUMBER.findall("\n".join(results))
         for figure in figures:
             if not any(rounds_to(figure, number) for number in numbers):
-                yield f"{path.relative_to(root)}: no page of results that is linked there has the figure {figure}: {paragraph.strip()}"
+                yield f"{path.relative_to(root)}: no section of results that is linked there has the figure {figure}: {paragraph.strip()}"
 
 
 def faults_of_tables(root, path):
