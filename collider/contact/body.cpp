@@ -246,7 +246,9 @@ Body bodyOf(const LevelSet& levelSet) {
     const Entries entries(levelSet);
     const auto kind = entries.find<std::int32_t>(entry::format);
     if (!kind)
-        throw std::invalid_argument("the field has no body stored with it (withBody(), or bilayer build --body)");
+        throw std::invalid_argument(
+            "the field has no body stored with it: store one by `bilayer build --body`, withBody() in C++, or "
+            "with_body() in Python");
     if (*kind != format)
         throw std::invalid_argument(
             fmt::format("the body is of kind {} ('{}'), which only another version knows", *kind, entry::format));

@@ -34,7 +34,7 @@ constexpr std::array<std::pair<const char*, fluid::SeedMode>, 3> modes{{{"unite"
                                                                         {"subtract", fluid::SeedMode::subtract}}};
 
 fluid::Placement placementOf(const py::object& pose, const py::object& scale) {
-    Floats factors(scale, "scale", {}, Range::nonNegative);
+    Floats factors(scale, "scale", {}, Range::finite);
     if (!factors.shape().empty() && factors.shape() != Shape{3})
         throw std::invalid_argument("scale: expected one number or three, got shape " + text(factors.shape()));
     factors.broadcast({3});
@@ -51,40 +51,66 @@ void dropHistory(openvdb::FloatGrid& liquid) {
     for (const std::string& name : names) liquid.removeMeta(name);
 }
 
-// A LevelSet, or a mesh of any kind.
+LevelSet withoutOrigin(const LevelSet& levelSet) {
+    openvdb::MetaMap all(*levelSet.grids().distance);
+    all.removeMeta(metadata::origin);
+    auto grids = std::make_shared<Grids>();
+    grids->distance = levelSet.grids().distance->copyReplacingMetadata(all);
+    return LevelSet(std::move(grids));
+}
+
+// A LevelSet, or a mesh of any kind. It is placed, scaled and rotated in its own coordinates, without its origin: those
+// of the world may be too far from zero for floats.
 class SolidArgument {
   public:
     SolidArgument(const py::object& solid, const char* name)
         : levelSet_(py::isinstance<LevelSet>(solid) ? solid.cast<const LevelSet*>() : nullptr),
           mesh_(levelSet_ ? nullptr : meshOf(solid, name)) {}
 
-    /// visit(LevelSet) or visit(Mesh); needs no GIL.
+    const glm::dvec3& origin() const { return levelSet_ ? levelSetOrigin_ : mesh_->origin; }
+
+    /// visit(LevelSet) or visit(Mesh), which have the origin zero; needs no GIL.
     template <class Visit>
     auto visit(const Visit& visit) const {
-        return levelSet_ ? visit(*levelSet_) : visit(static_cast<const Mesh&>(*mesh_));
+        const bool isFar = origin() != glm::dvec3(0);
+        if (levelSet_) return isFar ? visit(withoutOrigin(*levelSet_)) : visit(*levelSet_);
+        return isFar ? visit(Mesh{mesh_->points, mesh_->triangles, {}}) : visit(static_cast<const Mesh&>(*mesh_));
     }
 
   private:
     const LevelSet* levelSet_;
     SharedMesh mesh_;
+    glm::dvec3 levelSetOrigin_ = levelSet_ ? levelSet_->origin() : glm::dvec3(0);
 };
+
+// A transform into coordinates whose zero is at `zero`.
+Transform::Ptr relativeTo(const glm::dvec3& zero, const Transform& transform) {
+    const Transform::Ptr result = transform.copy();
+    result->postTranslate({-zero.x, -zero.y, -zero.z});
+    return result;
+}
 
 py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::object& pose, const py::object& scale,
                       const std::string& mode, bool uniteSolids) {
     const fluid::Placement placement = placementOf(pose, scale);
     fluid::SeedOptions options(byWord(modes, mode, "mode"), uniteSolids);
     const SolidArgument solid(body, "body");
+    const glm::dvec3 apart = solid.origin() - liquid.origin();
     openvdb::FloatGrid::Ptr grid;
     const auto [maxChange, where, changedVoxels] = cancellable(py::none(), [&](const Listener& listener) {
         options.progress = listener;
         grid = liquid.grids().distance->deepCopy();
         dropHistory(*grid);
-        return solid.visit([&](const auto& one) { return fluid::seed(*grid, one, placement, options); });
+        const Transform& voxels = liquid.grids().distance->transform();
+        grid->setTransform(relativeTo(apart, voxels));
+        const auto report = solid.visit([&](const auto& one) { return fluid::seed(*grid, one, placement, options); });
+        grid->setTransform(voxels.copy());
+        return report;
     });
     if (grid->activeVoxelCount() == 0) throw std::invalid_argument("body: it leaves nothing of the liquid");
     auto grids = std::make_shared<Grids>();
     grids->distance = grid;
-    return result("Seeded", LevelSet(std::move(grids)), maxChange, toArray(where), changedVoxels);
+    return result("Seeded", LevelSet(std::move(grids)), maxChange, toArray(where + apart), changedVoxels);
 }
 
 py::object makeParticles(const py::object& liquid, const py::object& pose, const py::object& scale,
@@ -176,9 +202,13 @@ Obstacle makeObstacle(const py::object& solid, double voxelSize, const py::objec
     return cancellable(py::none(), [&](const Listener& listener) {
         options.progress = listener;
         openvdb::initialize();
-        return body.visit([&](const auto& one) {
-            return Obstacle(fluid::solid(one, placement, *Transform::createLinearTransform(voxelSize), options));
-        });
+        const Transform::Ptr cells = Transform::createLinearTransform(voxelSize);
+        const fluid::Solid made = body.visit(
+            [&](const auto& one) { return fluid::solid(one, placement, *relativeTo(body.origin(), *cells), options); });
+        for (openvdb::GridBase* grid : std::initializer_list<openvdb::GridBase*>{
+                 made.distance.get(), made.velocity.get(), made.openFaces.get(), made.openVolume.get()})
+            grid->setTransform(cells->copy());
+        return Obstacle(made);
     });
 }
 
@@ -197,7 +227,8 @@ Combines a body with a liquid's level set, in the liquid's voxels. The result pa
 Ctrl-C cancels.
 
 liquid: a LevelSet with a band of 3 voxels or more on each side.
-body: a mesh or a LevelSet. pose: a Pose, a matrix of shape (4, 4), or None. scale: one number or three, above 0.
+body: a mesh or a LevelSet. pose: a Pose, a matrix of shape (4, 4), or None. scale: one number or three, above 0. Both
+act on the body's own coordinates, without its origin; then the body is where its origin puts it relative to the liquid.
 mode: "unite", "intersect" or "subtract". unite_solids: ignore walls inside overlapping solids of the mesh.
 
 Raises ValueError for a body that is open or without an inside, for a liquid that is no level set, and if nothing of the
@@ -213,11 +244,12 @@ liquid is left.
 constexpr const char* particlesDoc =
     R"(particles(liquid, pose=None, scale=1, voxel_size=None, per_voxel=8, seed=0) -> float32 (N, 3)
 
-Marker particles at jittered positions inside a liquid; none outside. The same seed gives the same particles.
+Marker particles at jittered positions inside a liquid; none outside. The same seed gives the same particles. Positions
+are relative to the liquid's origin.
 Ctrl-C cancels.
 
 liquid: a LevelSet, or a Field in a pose, whose mesh keeps particles from passing thin walls.
-voxel_size: of the solver's grid, for a Field; None for the field's own.
+pose, scale: of the field, as for seed(). voxel_size: of the solver's grid, for a Field; None for the field's own.
 per_voxel: particles in a voxel that is entirely inside, 1 to 1000.
 seed: an integer from 0 to 2^64 - 1.
 
@@ -233,7 +265,7 @@ constexpr const char* obstacleDoc =
     R"(obstacle(solid, voxel_size, pose=None, scale=1, velocity=(0, 0, 0), angular_velocity=(0, 0, 0),
          half_width_voxels=3) -> Obstacle
 
-What a pressure solver needs of a moving body, in cells whose centres are at whole multiples of voxel_size.
+What a pressure solver needs of a moving body, in cells whose centres are at whole multiples of voxel_size in the world.
 Ctrl-C cancels.
 
 solid: a mesh or a LevelSet. pose, scale: as for seed().
@@ -264,7 +296,13 @@ Raises ValueError for another extension, and RuntimeError if the file cannot be 
 void addFluid(py::module_& module) {
     py::class_<Obstacle> type(
         module, "Obstacle",
-        "A moving body in a solver's grid; obstacle() makes it. Arrays are dense over one box of cells.");
+        R"(A moving body in a solver's grid; obstacle() makes it. Arrays are dense over one box of cells.
+
+>>> import bilayer
+>>> ball = bilayer.obstacle(bilayer.sphere(0.5), voxel_size=0.1)
+>>> ball.distance.shape == ball.open_volume.shape
+True
+)");
     defineMethod(type, saveDoc, [](const Obstacle& self, const Path& path) { self.save(path); });
     type.def_property_readonly(
             "distance", [](const Obstacle& self) { return self.dense(*self.solid().distance); },

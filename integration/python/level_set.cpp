@@ -107,6 +107,7 @@ py::dict metadataOf(const LevelSet& levelSet) {
     all["active_voxels"] = counted<&LevelSet::activeVoxels>(levelSet);
     all["leaves"] = counted<&LevelSet::leaves>(levelSet);
     all["memory_bytes"] = counted<&LevelSet::memoryBytes>(levelSet);
+    all["has_triangles"] = levelSet.grids().triangle != nullptr;
     all["method"] = levelSet.method();
     all["sign"] = levelSet.sign();
     all["sign_reason"] = levelSet.signReason();
@@ -332,7 +333,10 @@ void addLevelSet(py::module_& module) {
         .def_property_readonly(
             "has_triangles", [](const LevelSet& self) { return self.grids().triangle != nullptr; },
             "Whether the nearest face of each active voxel is stored.")
-        .def_property_readonly("metadata", metadataOf, "All of the above, and more, by name.")
+        .def_property_readonly(
+            "metadata", metadataOf,
+            "All of the above by name, and more: `leaves`, the number of blocks of 8 x 8 x 8 voxels; "
+            "`sign_conflicts` and `sign_undecided`, where signs are in doubt; `build_seconds`.")
         .def(
             "__eq__",
             [](const LevelSet& a, const LevelSet& b) {

@@ -15,9 +15,25 @@ PYBIND11_MODULE(_bilayer, module) {
     module.doc() = "The native part of bilayer. Import bilayer instead.";
     module.attr("__version__") = BILAYER_VERSION;
     py::register_exception<Cancelled>(module, "Cancelled", PyExc_RuntimeError).doc() =
-        "Raised by build() and rebuild() after `progress` returned False.";
+        R"(Raised by build() and rebuild() after `progress` returned False.
+
+>>> import bilayer
+>>> try:
+...     bilayer.build(bilayer.sphere(1), resolution=64, progress=lambda done: False)
+... except bilayer.Cancelled:
+...     print("cancelled")
+cancelled
+)";
     py::register_exception<DeviceError>(module, "DeviceError", PyExc_RuntimeError).doc() =
-        "Error of an OpenCL device, or no such device.";
+        R"(Error of an OpenCL device, or no such device.
+
+>>> import bilayer
+>>> try:
+...     bilayer.build(bilayer.sphere(1), resolution=64, device="opencl:no such device")
+... except bilayer.DeviceError:
+...     print("no such device")
+no such device
+)";
     python::addMesh(module);
     python::addLevelSet(module);
     python::addBuild(module);

@@ -73,8 +73,13 @@ ShapeObject makeHull(const py::object& points, double radius) {
 
 ShapeObject makeSpheres(const py::object& centres, const py::object& radii) {
     const py::array_t<double> places = frozen(centres, "centres"), sizes = frozen(radii, "radii");
-    Floats centre(places, "centres", {3}), radius(sizes, "radii", {}, Range::nonNegative);
-    broadcast({&centre, &radius});
+    const Floats centre(places, "centres", {3}, Range::finite, Items::list);
+    Floats radius(sizes, "radii", {}, Range::nonNegative);
+    if (!radius.shape().empty() && radius.shape() != centre.shape())
+        throw std::invalid_argument(
+            fmt::format("radii: expected one number, or shape {} as for the centres, got shape {}",
+                        text(centre.shape()), text(radius.shape())));
+    radius.broadcast(centre.shape());
     const auto make = [&] {
         std::vector<SphereOfHull> spheres;
         for (std::size_t i = 0; i < centre.points().size(); ++i)

@@ -43,6 +43,7 @@ void checkFieldOf(const LevelSet& field, const Mesh& mesh, const BuildOptions& o
     if (field.method() != nameOf(options.method)) refuse(fmt::format("is of the method '{}'", field.method()));
     if (options.triangles && !field.grids().triangle) refuse("lacks the nearest triangles");
     if (field.meshHash() != hash(mesh)) refuse("is of another mesh");
+    if (field.origin() != mesh.origin) refuse("has another origin than the mesh");
 }
 
 bool hasCleanNormalSigns(const LevelSet& field, const BuildOptions& options) {

@@ -145,6 +145,8 @@ Mesh orientedMesh(const LevelSet& levelSet, Mesh mesh) {
     validate(mesh);
     if (levelSet.meshHash() != 0 && levelSet.meshHash() != hash(mesh))
         throw std::invalid_argument("the level set is of another mesh");
+    if (levelSet.origin() != mesh.origin)
+        throw std::invalid_argument("the level set has another origin than the mesh: one of them was moved");
     const std::string& reason = levelSet.signReason();
     const bool asItStands = reason == closedAndOriented || reason == asAskedFor;
     if (levelSet.sign() == "normals" && asItStands) return mesh;

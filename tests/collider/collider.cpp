@@ -99,6 +99,11 @@ TEST_CASE("a body whose mesh is open or one-sided has the mass of its field, and
 TEST_CASE("a collider rejects the level set of another mesh") {
     const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
     REQUIRE_THROWS_AS(Collider(mesh, build(shapes::sphere(0.4f, 4), {.voxelSize = h})), std::invalid_argument);
+    Mesh moved = mesh;
+    moved.origin.x = 1;
+    const LevelSet levelSet = build(mesh, {.voxelSize = h});
+    REQUIRE_THROWS_WITH(Collider(moved, levelSet), Catch::Contains("another origin"));
+    REQUIRE_THROWS_WITH(Field(levelSet, moved), Catch::Contains("another origin"));
 }
 
 TEST_CASE("a collider rejects an empty mesh") {

@@ -81,6 +81,8 @@ def test_collider(box, box_set, collider, sphere):
             bilayer.Collider(box, box_set, **options)
     with pytest.raises(ValueError, match="level_set: the level set is of another mesh"):
         bilayer.Collider(sphere, box_set)
+    with pytest.raises(ValueError, match="level_set: the level set has another origin than the mesh"):
+        bilayer.Collider(bilayer.Mesh(box.vertices, box.faces, (1, 0, 0)), box_set)
     for swapped, call in (
         (lambda: bilayer.Collider(box_set, box), r"Collider\(mesh, level_set\)"),
         (lambda: bilayer.Field(box, box_set), r"Field\(level_set, mesh\)"),
@@ -314,6 +316,10 @@ def test_bad_shapes(collider):
         (lambda: bilayer.Shape.sphere(0), "radius: the radius is 0"),
         (lambda: bilayer.Shape.cone(1, -1), "half_height: the half height is -1"),
         (lambda: bilayer.Shape.spheres([(0, 0, 0)], 0), "radii: the radii are all 0"),
+        (lambda: bilayer.Shape.spheres([(0, 0, 0)], [1, 2]), r"radii: expected one number, or shape \(1,\) .* \(2,\)"),
+        (lambda: bilayer.Shape.spheres([(0, 0, 0), (1, 0, 0)], [[1], [2]]), r"radii: expected .* got shape \(2, 1\)"),
+        (lambda: bilayer.Shape.spheres((0, 0, 0), [1, 2]), r"centres: expected .* got shape \(3,\)"),
+        (lambda: bilayer.Shape.spheres(np.zeros((2, 2, 3)), 1), r"centres: expected .* got shape \(2, 2, 3\)"),
         (lambda: bilayer.Shape.spheres([(0, 0, 0)], -1), "radii is -1"),
         (lambda: bilayer.Shape.plane((0, 0, 1), np.inf), "offset: the offset of the plane is not finite"),
         (lambda: bilayer.Shape.triangles(bilayer.Mesh(np.zeros((0, 3)), [])), "mesh: the mesh has no triangle"),

@@ -34,13 +34,60 @@ def test_seed(tank):
     assert volume(tank) == pytest.approx(4, rel=0.001)
 
 
+def far(mesh, origin):
+    return bilayer.Mesh(mesh.vertices, mesh.faces, origin)
+
+
+ORIGIN = (500000, 4000000, -800)
+TURNED = bilayer.Pose((0.5, -0.25, 0.5), (0.8, 0, 0.6, 0))
+
+
+@pytest.mark.parametrize("is_field", [False, True])
+@pytest.mark.parametrize("mode", ["unite", "intersect", "subtract"])
+def test_seeds_far_from_zero_are_those_near_it(tank, mode, is_field):
+    there = bilayer.build(far(bilayer.box((2, 2, 1)), ORIGIN), voxel_size=0.05)
+    body, moved = bilayer.box((0.5, 0.7, 0.9)), far(bilayer.box((0.5, 0.7, 0.9)), ORIGIN)
+    if is_field:
+        body, moved = bilayer.build(body, voxel_size=0.04), bilayer.build(moved, voxel_size=0.04)
+    here, result = (bilayer.seed(a, b, TURNED, (1, 2, 0.5), mode) for a, b in ((tank, body), (there, moved)))
+    assert np.array_equal(result.liquid.origin, ORIGIN) and np.array_equal(here.liquid.origin, (0, 0, 0))
+    for one, other in zip(here.liquid.to_numpy(), result.liquid.to_numpy()):
+        assert np.array_equal(one, other)
+    assert here.changed_voxels == result.changed_voxels and np.allclose(here.where, result.where, atol=1e-6)
+
+
+def test_bodies_of_a_seed_are_where_their_origins_put_them(tank):
+    there = bilayer.build(far(bilayer.box((2, 2, 1)), ORIGIN), voxel_size=0.05)
+    ball, up = bilayer.sphere(0.3), np.float64([0.25, 0, 0.5])
+    for form in (lambda mesh: mesh, lambda mesh: bilayer.build(mesh, resolution=24)):
+        apart = bilayer.seed(there, form(far(ball, ORIGIN + up))).liquid
+        again = bilayer.seed(tank, form(ball), pose=bilayer.Pose(up)).liquid
+        for one, other in zip(apart.to_numpy(), again.to_numpy()):
+            assert np.allclose(one, other, atol=1e-6)
+    same = bilayer.seed(there, there).liquid
+    assert np.array_equal(same.to_numpy().values, bilayer.seed(tank, tank).liquid.to_numpy().values)
+
+
+@pytest.mark.parametrize("is_field", [False, True])
+def test_obstacles_far_from_zero_are_those_near_it(is_field):
+    origin, solid = (5000, -40000, 25), bilayer.box((0.5, 0.7, 0.9))  # whole cells
+    moved = far(solid, origin)
+    if is_field:
+        solid, moved = bilayer.build(solid, voxel_size=0.05), bilayer.build(moved, voxel_size=0.05)
+    options = {"velocity": (1, 2, 3), "angular_velocity": (0, 1, 2)}
+    here, there = (bilayer.obstacle(body, 0.125, TURNED, 1.5, **options) for body in (solid, moved))
+    assert np.array_equal(here.origin + origin, there.origin)
+    for name in ("distance", "velocity", "open_faces", "open_volume"):
+        assert np.allclose(getattr(here, name), getattr(there, name), atol=1e-6)
+
+
 def test_bad_seeds(tank):
     ball = bilayer.sphere(0.3)
     for options, message in (
         ({"mode": "add"}, "mode: expected one of 'unite', 'intersect', 'subtract'"),
         ({"scale": 0}, "scale"),
         ({"scale": (1, 2)}, r"scale: expected one number or three, got shape \(2,\)"),
-        ({"scale": -1}, "scale is -1"),
+        ({"scale": -1}, "scale is -1, and must be above 0"),
         ({"pose": np.eye(3)}, "pose: expected"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Optional
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional, Type, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +16,41 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
+Result = TypeVar("Result")
 
 
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return np.array_equal(a, b, equal_nan=a.dtype.kind == b.dtype.kind == "f")
+    return bool(a == b)
+
+
+def _comparable(result: Type[Result]) -> Type[Result]:
+    """Lets named tuples compare field by field: as tuples, they would ask arrays for a truth value."""
+
+    def equal(self: Any, other: Any) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(map(_same, self, other))
+
+    for name, value in (("__eq__", equal), ("__ne__", object.__ne__), ("__hash__", None)):
+        setattr(result, name, value)
+    return result
+
+
+@_comparable
 class Samples(NamedTuple):
     """Field.sample(): arrays of the points' leading shape (...). A tuple, so that it can be unpacked.
 
     distance: float32 (...), signed; outside the band a bound with the right sign.
     gradient: float32 (..., 3), of length near 1; zero outside the band.
     in_band: bool (...), whether all eight voxels around the point are in the band.
+
+    >>> import bilayer
+    >>> field = bilayer.Field(bilayer.build(bilayer.sphere(1), resolution=32))
+    >>> distance, gradient, in_band = field.sample([[1, 0, 0], [0, 0, 1.05]])
+    >>> in_band
+    array([ True,  True])
     """
 
     distance: Floats
@@ -31,6 +58,7 @@ class Samples(NamedTuple):
     in_band: Bools
 
 
+@_comparable
 class ClosestPoints(NamedTuple):
     """Field.closest(): arrays of the points' leading shape (...). A tuple, so that it can be unpacked.
 
@@ -41,6 +69,12 @@ class ClosestPoints(NamedTuple):
     feature: uint8 (...): 0 face, 1 edge, 2 vertex.
     feature_index: uint8 (...), which edge of the face, from that corner to the next, or which corner.
     found: bool (...), False where the surface is farther than max_distance.
+
+    >>> import bilayer
+    >>> box = bilayer.box()
+    >>> closest = bilayer.Field(bilayer.build(box, resolution=32), box).closest([2, 0, 0])
+    >>> float(closest.distance), closest.position.tolist()
+    (1.5, [0.5, 0.0, 0.0])
     """
 
     distance: Floats
@@ -52,6 +86,7 @@ class ClosestPoints(NamedTuple):
     found: Bools
 
 
+@_comparable
 class Hits(NamedTuple):
     """Field.raycast(), sphere_cast() and segment(): arrays of the rays' leading shape (...). A tuple, so that it can be
     unpacked: its length is that of the tuple, not the number of rays.
@@ -62,6 +97,12 @@ class Hits(NamedTuple):
     nan without a hit.
     normal: float32 (..., 3), outward, of length 1; the reversed direction for a start inside; nan without a hit.
     triangle: int32 (...), index of the face; -1 without a mesh or a hit, and for a start inside.
+
+    >>> import bilayer
+    >>> box = bilayer.box()
+    >>> hits = bilayer.Field(bilayer.build(box, resolution=32), box).raycast([2, 0, 0], [-1, 0, 0])
+    >>> bool(hits.hit), float(hits.distance)
+    (True, 1.5)
     """
 
     hit: Bools
@@ -77,7 +118,7 @@ class _Fields:
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        return all(np.array_equal(value, getattr(other, name)) for name, value in vars(self).items())
+        return all(_same(value, getattr(other, name)) for name, value in vars(self).items())
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -97,6 +138,13 @@ class Contacts(_Fields):
     rotates, in the meshes' unit; negative where the contact moves along as the surfaces roll.
     points_tested: int, surface points that were sampled in the other body's field.
     beyond_band: int, those of them that are too deep inside for the band, and make no contact.
+
+    >>> import bilayer
+    >>> box = bilayer.box()
+    >>> ball, body = bilayer.Shape.sphere(0.5), bilayer.Collider(box, bilayer.build(box, resolution=32))
+    >>> contacts = bilayer.collide(ball, bilayer.Pose((0, 0, 0.99)), body, None)
+    >>> bool(contacts), round(float(contacts.distance.min()), 3)
+    (True, -0.01)
     """
 
     position: Floats
@@ -112,6 +160,7 @@ class Contacts(_Fields):
         return len(self.distance)
 
 
+@_comparable
 class BodyDistance(NamedTuple):
     """distance(): the closest points of two bodies, in the world of the poses.
 
@@ -121,6 +170,13 @@ class BodyDistance(NamedTuple):
     position_a, position_b: float32 (3,), the closest points.
     normal: float32 (3,), of length 1, from b to a.
     triangle_a, triangle_b: int, faces of the closest points; -1 where not known.
+
+    >>> import bilayer
+    >>> box = bilayer.box()
+    >>> body = bilayer.Collider(box, bilayer.build(box, resolution=32))
+    >>> apart = bilayer.distance(bilayer.Shape.sphere(0.5), bilayer.Pose((3, 0, 0)), body, None)
+    >>> apart.overlap, round(apart.distance, 3)
+    ('none', 2.0)
     """
 
     found: bool
@@ -133,6 +189,7 @@ class BodyDistance(NamedTuple):
     triangle_b: int
 
 
+@_comparable
 class Impact(NamedTuple):
     """time_of_impact(): when two moving bodies touch.
 
@@ -140,6 +197,13 @@ class Impact(NamedTuple):
     fraction: float, of the motion until they touch, 0 to 1.
     pose_a, pose_b: Pose, at that time.
     distance: BodyDistance, at that time; of a penetration only its place and normal count.
+
+    >>> import bilayer
+    >>> box = bilayer.box()
+    >>> body, motion = bilayer.Collider(box, bilayer.build(box, resolution=32)), [[-4, 0, 0], [0, 0, 0]]
+    >>> impact = bilayer.time_of_impact(bilayer.Shape.sphere(0.5), bilayer.Pose((3, 0, 0)), motion, body, None, None)
+    >>> impact.found, round(impact.fraction, 2)
+    (True, 0.5)
     """
 
     found: bool
@@ -149,6 +213,7 @@ class Impact(NamedTuple):
     distance: BodyDistance
 
 
+@_comparable
 class MassProperties(NamedTuple):
     """mass_properties() and Collider.mass, for density 1.
 
@@ -157,6 +222,10 @@ class MassProperties(NamedTuple):
     inertia: float32 (3, 3), the inertia tensor about the centre of mass.
     principal_inertia: float32 (3,), ascending.
     principal_axes: float32 (4,), the quaternion w, x, y, z that rotates the principal axes to those of the mesh.
+
+    >>> import bilayer
+    >>> round(bilayer.mass_properties(bilayer.box((1, 2, 3))).volume, 3)
+    6.0
     """
 
     volume: float
@@ -166,12 +235,18 @@ class MassProperties(NamedTuple):
     principal_axes: Floats
 
 
+@_comparable
 class Dense(NamedTuple):
     """LevelSet.to_numpy(): values[i, j, k] is the distance at origin + spacing * (i, j, k).
 
     values: float32 (nx, ny, nz), negative inside.
     origin: float64 (3,), the centre of values[0, 0, 0]; relative to LevelSet.origin, as the points of queries.
     spacing: float, the voxel size.
+
+    >>> import bilayer
+    >>> values, origin, spacing = bilayer.build(bilayer.sphere(1), voxel_size=0.125).to_numpy()
+    >>> values.ndim, spacing
+    (3, 0.125)
     """
 
     values: Floats
@@ -179,6 +254,7 @@ class Dense(NamedTuple):
     spacing: float
 
 
+@_comparable
 class Sparse(NamedTuple):
     """LevelSet.sparse(): values[n] is the distance at origin + spacing * coordinates[n].
 
@@ -187,6 +263,11 @@ class Sparse(NamedTuple):
     triangles: int32 (N,), the nearest faces; None without them.
     origin: float64 (3,), zero; relative to LevelSet.origin, as the points of queries.
     spacing: float, the voxel size.
+
+    >>> import bilayer
+    >>> sparse = bilayer.build(bilayer.sphere(1), voxel_size=0.125).sparse()
+    >>> len(sparse.coordinates) == len(sparse.values), sparse.triangles is None
+    (True, True)
     """
 
     coordinates: Ints
@@ -196,6 +277,7 @@ class Sparse(NamedTuple):
     spacing: float
 
 
+@_comparable
 class Seeded(NamedTuple):
     """seed(): the new liquid, and how far distances were changed to make it a level set.
 
@@ -203,6 +285,11 @@ class Seeded(NamedTuple):
     max_change_voxels: float, the largest change of a distance, near creases, in voxels.
     where: float64 (3,), the centre of that voxel, relative to LevelSet.origin.
     changed_voxels: int, voxels that changed by more than 0.1 voxels.
+
+    >>> import bilayer
+    >>> tank = bilayer.build(bilayer.box((2, 2, 1)), voxel_size=0.1)
+    >>> bilayer.seed(tank, bilayer.sphere(0.4), mode="subtract").liquid.voxel_size == tank.voxel_size
+    True
     """
 
     liquid: LevelSet
@@ -236,6 +323,10 @@ class MeshReport(_Fields):
     area: float. volume: float, signed; it has a meaning only for a closed mesh.
     closed: bool, no boundary and no non-manifold edges. oriented: bool, no misoriented edges or components inside out.
     verdict: str, all of that in words.
+
+    >>> import bilayer
+    >>> bilayer.inspect(bilayer.box()).verdict
+    'closed and oriented'
     """
 
     vertices: int
