@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Velocities of the objects of a world.
-// Tested by tests/bullet/multibodies.cpp and tests/bullet/moving.cpp.
+// Tested by tests/bullet/multibodies.cpp.
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
