@@ -2,6 +2,7 @@
 #include "sdf/mesh/triangle_contacts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <glm/common.hpp>
@@ -13,28 +14,65 @@ namespace {
 /// vertex.
 constexpr double negligible = 4;
 
-/// Tests whether a box overlaps both a face's bounding box and its plane, with the slack as a margin.
+/// The planes through a face's edges, perpendicular to it.
+class EdgePlanes {
+  public:
+    EdgePlanes(const DoubleTriangle& face, double slack) : slack_(2 * slack) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            const glm::dvec3 &from = face.corners[i], along = face.corners[(i + 1) % 3] - from;
+            outward_[i] = glm::normalize(glm::cross(along, face.normal));
+            offset_[i] = glm::dot(outward_[i], from);
+        }
+    }
+
+    /// Whether a box is beyond one of the planes by more than the slack.
+    bool isBeyond(const glm::dvec3& lower, const glm::dvec3& upper) const {
+        for (std::size_t i = 0; i < 3; ++i)
+            if (glm::dot(outward_[i], lower + upper) - glm::dot(glm::abs(outward_[i]), upper - lower) >
+                2 * (offset_[i] + slack_))
+                return true;
+        return false;
+    }
+
+    bool isBeyond(const TriangleCorners& triangle) const {
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto height = [&](const glm::dvec3& p) { return glm::dot(outward_[i], p) - offset_[i]; };
+            if (std::min({height(triangle[0]), height(triangle[1]), height(triangle[2])}) > slack_) return true;
+        }
+        return false;
+    }
+
+  private:
+    std::array<glm::dvec3, 3> outward_;
+    std::array<double, 3> offset_;
+    double slack_;  // twice that of the contacts, for rounding
+};
+
+/// Tests whether a box overlaps a face's bounding box, its plane, and the prism over it, with the slack as a margin.
 class TriangleOverlap {
   public:
-    TriangleOverlap(const Bounds& own, const DoubleTriangle& face, double slack)
+    TriangleOverlap(const Bounds& own, const DoubleTriangle& face, const EdgePlanes& edges, double slack)
         : lower_(glm::dvec3(own.lower) - slack),
           upper_(glm::dvec3(own.upper) + slack),
           normal_(face.normal),
           away_(glm::abs(face.normal)),
           at_(2 * glm::dot(face.normal, face.corners[0])),
-          slack_(2 * slack) {}
+          slack_(2 * slack),
+          edges_(edges) {}
 
     bool operator()(const Bounds& other) const {
         const glm::dvec3 lower(other.lower), upper(other.upper);
         for (int axis = 0; axis < 3; ++axis)
             if (lower[axis] > upper_[axis] || lower_[axis] > upper[axis]) return false;
-        return std::abs(glm::dot(normal_, lower + upper) - at_) <= glm::dot(away_, upper - lower) + slack_;
+        return std::abs(glm::dot(normal_, lower + upper) - at_) <= glm::dot(away_, upper - lower) + slack_ &&
+               !edges_.isBeyond(lower, upper);
     }
 
   private:
     const glm::dvec3 lower_, upper_;
     const glm::dvec3 normal_, away_;
     const double at_, slack_;  // both doubled
+    const EdgePlanes& edges_;
 };
 
 /// A point on a face's plane, and the height from which it was projected.
@@ -118,17 +156,25 @@ std::vector<Segment> TriangleContacts::within(unsigned triangle) const {
     const DoubleTriangle face(mesh_, mesh_.triangles[triangle]);
     std::vector<Segment> found;
     if (!(face.area > 0)) return found;
-    tree_.descend(TriangleOverlap(tree_.boxOf(triangle), face, slack_), [&](unsigned other) {
-        if (other != triangle) add(triangle, face, other, found);
+    const EdgePlanes edges(face, slack_);
+    tree_.descend(TriangleOverlap(tree_.boxOf(triangle), face, edges, slack_), [&](unsigned other) {
+        if (other == triangle) return;
+        const TriangleCorners corners = cornersOf(other);
+        const double height[] = {face.height(corners[0]), face.height(corners[1]), face.height(corners[2])};
+        const auto [low, high] = std::minmax({height[0], height[1], height[2]});
+        if (low <= 2 * slack_ && high >= -2 * slack_ && !edges.isBeyond(corners))
+            add(triangle, face, other, corners, found);
     });
     return found;
 }
 
+TriangleCorners TriangleContacts::cornersOf(unsigned triangle) const {
+    const glm::uvec3& t = mesh_.triangles[triangle];
+    return {glm::dvec3(mesh_.points[t.x]), glm::dvec3(mesh_.points[t.y]), glm::dvec3(mesh_.points[t.z])};
+}
+
 void TriangleContacts::add(unsigned triangle, const DoubleTriangle& face, unsigned other,
-                           std::vector<Segment>& found) const {
-    const glm::uvec3& t = mesh_.triangles[other];
-    const TriangleCorners corners{glm::dvec3(mesh_.points[t.x]), glm::dvec3(mesh_.points[t.y]),
-                                  glm::dvec3(mesh_.points[t.z])};
+                           const TriangleCorners& corners, std::vector<Segment>& found) const {
     ProjectedPolygon projected;
     for (const glm::dvec3& p : corners) projected.push_back({face.onPlane(p), face.height(p)});
     for (const Segment& segment : contacts(projected, face.normal, slack_)) {

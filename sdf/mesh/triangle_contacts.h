@@ -46,7 +46,9 @@ class TriangleContacts {
     std::vector<Segment> within(unsigned triangle) const;
 
   private:
-    void add(unsigned triangle, const DoubleTriangle& face, unsigned other, std::vector<Segment>& found) const;
+    TriangleCorners cornersOf(unsigned triangle) const;
+    void add(unsigned triangle, const DoubleTriangle& face, unsigned other, const TriangleCorners& corners,
+             std::vector<Segment>& found) const;
     bool alongSharedEdge(unsigned triangle, unsigned other, const DoubleTriangle& face, const Segment& segment) const;
     bool atSharedVertex(unsigned triangle, unsigned other, const DoubleTriangle& face, const Segment& segment) const;
 

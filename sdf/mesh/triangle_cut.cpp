@@ -33,6 +33,13 @@ glm::dvec3 crossing(const glm::dvec3& a, double atA, const glm::dvec3& b, double
     return a + atA / (atA - atB) * (b - a);
 }
 
+double distance(const Segment& segment, const glm::dvec3& p) {
+    const glm::dvec3 along = segment.to - segment.from;
+    const double squared = glm::dot(along, along);
+    const double at = squared > 0 ? std::clamp(glm::dot(p - segment.from, along) / squared, 0.0, 1.0) : 0;
+    return glm::distance(p, segment.from + at * along);
+}
+
 /// Items on the two sides of a line: 0 where heights are negative, 1 where they are positive.
 template <class Item>
 using Halves = std::array<Item, 2>;
@@ -109,6 +116,7 @@ class Cutter {
 
   private:
     Pieces divide(Polygon polygon, std::vector<Cut> cuts) const {
+        dropAlongBorder(polygon, cuts);
         while (!cuts.empty()) {
             Split halves = splitAcross(polygon, cuts);
             if (!isUseful(halves, cuts.size())) {
@@ -122,6 +130,16 @@ class Cutter {
                           divide(std::move(halves.polygons[1]), std::move(halves.cuts[1])));
         }
         return labelled(std::move(polygon));
+    }
+
+    /// Drops the segments within the slack of an edge of the polygon: what they cut off is too thin for a piece.
+    void dropAlongBorder(const Polygon& polygon, std::vector<Cut>& cuts) const {
+        for (std::size_t i = 0; i < polygon.size(); ++i) {
+            const Segment edge{polygon[i], polygon[(i + 1) % polygon.size()]};
+            std::erase_if(cuts, [&](const Cut& cut) {
+                return distance(edge, cut.segment.from) <= slack_ && distance(edge, cut.segment.to) <= slack_;
+            });
+        }
     }
 
     struct Split {
