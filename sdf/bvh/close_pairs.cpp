@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include <bit>
+#include <limits>
 
 #include "sdf/bvh/tree_lanes.h"
 
@@ -22,6 +23,9 @@ using IndexTag = hn::RebindToUnsigned<Tag>;
 /// Rounding error of a volume in floats, relative to the sum of the absolute values of its products: eight roundings
 /// plus a margin.
 constexpr float roundingOfVolume = 1e-6f;
+/// Rounding error of a coordinate along an oblique axis in floats, relative to the max coordinate; generous.
+constexpr float roundingOfPlaces = 1e-6f;
+constexpr float infinite = std::numeric_limits<float>::infinity();
 /// Upper bound on what underflow of products loses.
 constexpr float minProduct = 1e-30f, minVolume = 1e-37f;
 
@@ -195,7 +199,10 @@ class LeafPairs {
         const BoxGroup& group = tree_.boxes().group(node);
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
             const BoxLanes boxes(loadLanes(Tag(), group.lower, lane), loadLanes(Tag(), group.upper, lane));
-            for (unsigned bits = bitsOf(hn::AndNot(boxes.share(own), boxes.meet(own))); bits != 0; bits &= bits - 1) {
+            unsigned bits = bitsOf(hn::AndNot(boxes.share(own), boxes.meet(own)));
+            if (bits != 0)
+                if (const OrientedGroup* oriented = tree_.orientedGroup(node)) bits &= inOriented(*oriented, lane);
+            for (; bits != 0; bits &= bits - 1) {
                 const std::size_t place = lane + std::size_t(std::countr_zero(bits));
                 const std::uint32_t child = group.firstChild + std::uint32_t(place);
                 if (!tree_.boxes().isLeaf(child))
@@ -210,6 +217,29 @@ class LeafPairs {
         hn::Store(points.x, Tag(), to[0] + lane);
         hn::Store(points.y, Tag(), to[1] + lane);
         hn::Store(points.z, Tag(), to[2] + lane);
+    }
+
+    // Returns a bit for each oriented box of a group, from a lane on, that the leaf's triangles may meet.
+    unsigned inOriented(const OrientedGroup& group, std::size_t lane) const {
+        const Tag tag;
+        Mask meets = hn::FirstN(tag, treeWidth);
+        const Vec room = hn::Set(tag, roundingOfPlaces * tree_.largestCoordinate());
+        for (int k = 0; k < 3; ++k) {
+            const PointLanes axis{hn::Set(tag, group.axes[k][0]), hn::Set(tag, group.axes[k][1]),
+                                  hn::Set(tag, group.axes[k][2])};
+            Vec low = hn::Set(tag, infinite), high = hn::Set(tag, -infinite);
+            for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag))
+                for (const auto& corner : leaf_.corners) {
+                    const Vec at = dot(loadLanes(tag, corner, i), axis);
+                    low = hn::Min(low, at);
+                    high = hn::Max(high, at);
+                }
+            low = hn::Sub(hn::MinOfLanes(tag, low), room);
+            high = hn::Add(hn::MaxOfLanes(tag, high), room);
+            meets = hn::And(meets, hn::And(hn::Le(hn::Load(tag, group.lower[k] + lane), high),
+                                           hn::Ge(hn::Load(tag, group.upper[k] + lane), low)));
+        }
+        return bitsOf(meets);
     }
 
     // Returns the triangles of the leaf whose boxes overlap a box.
