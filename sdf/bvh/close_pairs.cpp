@@ -9,8 +9,8 @@
 #include <hwy/highway.h>
 
 #include <bit>
-#include <limits>
 
+#include "sdf/bvh/rotated_boxes.h"
 #include "sdf/bvh/tree_lanes.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -24,8 +24,7 @@ using IndexTag = hn::RebindToUnsigned<Tag>;
 /// plus a margin.
 constexpr float roundingOfVolume = 1e-6f;
 /// Rounding error of a coordinate along an oblique axis in floats, relative to the max coordinate; generous.
-constexpr float roundingOfPlaces = 1e-6f;
-constexpr float infinite = std::numeric_limits<float>::infinity();
+constexpr float roundingOfPlaces = 4e-6f;
 /// Upper bound on what underflow of products loses.
 constexpr float minProduct = 1e-30f, minVolume = 1e-37f;
 
@@ -177,7 +176,19 @@ class LeafPairs {
   public:
     LeafPairs(const Mesh& mesh, const TriangleTree& tree, std::uint32_t leaf,
               std::vector<std::pair<unsigned, unsigned>>& pairs)
-        : mesh_(mesh), tree_(tree), index_(leaf), leaf_(tree.leaf(leaf)), pairs_(pairs) {
+        : mesh_(mesh),
+          tree_(tree),
+          index_(leaf),
+          leaf_(tree.leaf(leaf)),
+          own_(*tree.orientedGroup(tree.boxes().leafCount + leaf / treeWidth)),
+          box_(own_.lower, own_.upper, leaf % treeWidth),
+          edges_(box_),
+          room_(roundingOfPlaces * tree.largestCoordinate()),
+          pairs_(pairs) {
+        if (const FanGroup* fans = tree.fanGroup(own_)) {
+            vertex_ = fans->vertex[leaf % treeWidth];
+            edges_ = Interval(fans->lower, fans->upper, leaf % treeWidth);
+        }
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
             const BoxLanes boxes = Lanes(leaf_, lane).boxes;
             store(boxes.lower, lower_, lane);
@@ -219,15 +230,44 @@ class LeafPairs {
         hn::Store(points.z, Tag(), to[2] + lane);
     }
 
-    // Returns a bit for each oriented box of a group, from a lane on, that the leaf's triangles may meet.
+    // Returns a bit for each child of a group, from a lane on, whose triangles may meet those of the leaf.
     unsigned inOriented(const OrientedGroup& group, std::size_t lane) const {
+        const Rotation rotation(own_, group, room_);
+        const unsigned bits = reached(group, lane) & rotation.met(box_, group.lower, group.upper, lane);
+        const FanGroup* fans = tree_.fanGroup(group);
+        if (bits == 0 || vertex_ == noVertex || !fans) return bits;
+        unsigned sameFan = 0;
+        for (std::size_t i = 0; lane + i < treeWidth; ++i) sameFan |= unsigned(fans->vertex[lane + i] == vertex_) << i;
+        return bits & (~sameFan | rotation.met(edges_, group.lower, group.upper, lane) |
+                       rotation.met(box_, fans->lower, fans->upper, lane));
+    }
+
+    // Returns the lanes whose triangles meet the leaf's box along its own axes.
+    Mask alongAxes(const Lanes& lanes) const {
         const Tag tag;
         Mask meets = hn::FirstN(tag, treeWidth);
-        const Vec room = hn::Set(tag, roundingOfPlaces * tree_.largestCoordinate());
         for (int k = 0; k < 3; ++k) {
-            const PointLanes axis{hn::Set(tag, group.axes[k][0]), hn::Set(tag, group.axes[k][1]),
-                                  hn::Set(tag, group.axes[k][2])};
-            Vec low = hn::Set(tag, infinite), high = hn::Set(tag, -infinite);
+            const PointLanes axis = axisLanes(own_, k);
+            const Vec a = dot(lanes.corners[0], axis), b = dot(lanes.corners[1], axis), c = dot(lanes.corners[2], axis);
+            meets = hn::And(meets, hn::And(hn::Le(BoxLanes::smallest(a, b, c), hn::Set(tag, box_.upper[k] + room_)),
+                                           hn::Ge(BoxLanes::largest(a, b, c), hn::Set(tag, box_.lower[k] - room_))));
+        }
+        return meets;
+    }
+
+    static PointLanes axisLanes(const OrientedGroup& group, int k) {
+        const Tag tag;
+        return {hn::Set(tag, group.axes[k][0]), hn::Set(tag, group.axes[k][1]), hn::Set(tag, group.axes[k][2])};
+    }
+
+    // Returns a bit for each oriented box of a group, from a lane on, that the leaf's corners reach.
+    unsigned reached(const OrientedGroup& group, std::size_t lane) const {
+        const Tag tag;
+        Mask meets = hn::FirstN(tag, treeWidth);
+        const Vec room = hn::Set(tag, room_);
+        for (int k = 0; k < 3; ++k) {
+            const PointLanes axis = axisLanes(group, k);
+            Vec low = dot(loadLanes(tag, leaf_.corners[0], 0), axis), high = low;
             for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag))
                 for (const auto& corner : leaf_.corners) {
                     const Vec at = dot(loadLanes(tag, corner, i), axis);
@@ -258,7 +298,9 @@ class LeafPairs {
         const std::size_t count = tree_.leafSize(other);
         for (std::size_t lane = 0; lane < count; lane += hn::Lanes(tag)) {
             const Lanes lanes(leaf, lane);
-            const Mask near = hn::And(hn::FirstN(tag, count - lane), lanes.boxes.meet(own));
+            const Mask inBoxes = hn::And(hn::FirstN(tag, count - lane), lanes.boxes.meet(own));
+            if (hn::AllFalse(tag, inBoxes)) continue;
+            const Mask near = hn::And(inBoxes, alongAxes(lanes));
             if (hn::AllFalse(tag, near)) continue;
             const Others others(mesh_, leaf, lane, lanes);
             for (unsigned bits = mine; bits != 0; bits &= bits - 1)
@@ -284,6 +326,10 @@ class LeafPairs {
     const TriangleTree& tree_;
     const std::uint32_t index_;
     const TriangleLeaf& leaf_;
+    const OrientedGroup& own_;
+    Interval box_, edges_;             // along its axes: all of the leaf, and the edges opposite to the common vertex
+    const float room_;                 // margin along axes [m]
+    std::uint32_t vertex_ = noVertex;  // that all triangles of the leaf share
     alignas(64) float lower_[3][treeWidth], upper_[3][treeWidth];  // boxes of the leaf's triangles
     std::vector<std::pair<unsigned, unsigned>>& pairs_;
 };

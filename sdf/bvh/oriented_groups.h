@@ -5,9 +5,12 @@
 // Tested by tests/sdf/triangle_tree.cpp through TriangleTree.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <vector>
 
+#include <bilayer/sdf/mesh.h>
 #include "sdf/base/large_array.h"
 #include "sdf/bvh/box_tree.h"
 
@@ -24,7 +27,8 @@ struct OrientedGroup {
     alignas(64) float lower[3][treeWidth];  ///< by axis
     float upper[3][treeWidth];
     std::int8_t lowerNormal[3][treeWidth], upperNormal[3][treeWidth];
-    float axes[3][3];  ///< of about unit length
+    float axes[3][3];    ///< of about unit length
+    std::uint32_t fans;  ///< index of its FanGroup, or `noFans`
 
     /// Returns a vector's coordinates along the axes.
     template <class Vector>
@@ -37,11 +41,26 @@ struct OrientedGroup {
     }
 };
 
+inline constexpr std::uint32_t noFans = ~0u, noVertex = ~0u;
+
+/// The children of an oriented group whose triangles all share a vertex. Where two triangles with a common vertex
+/// intersect in a segment, so does an edge of one of them that is opposite to the vertex.
+struct FanGroup {
+    alignas(64) float lower[3][treeWidth];  ///< boxes of the opposite edges, along the axes of the group
+    float upper[3][treeWidth];
+    std::uint32_t vertex[treeWidth];  ///< the vertex of the mesh, or `noVertex`
+};
+
+struct OrientedGroups {
+    LargeArray<OrientedGroup> groups;
+    std::vector<FanGroup> fans;
+};
+
 /// Returns the oriented boxes of all groups over at most 512 leaves, in the order of the tree's groups. Larger groups
 /// are few.
 /// @param lastLeaf  count of triangles in the last leaf
 /// @param progress  polled, unless null
-LargeArray<OrientedGroup> orientedGroups(const BoxTree& boxes, const LargeArray<TriangleLeaf>& leaves,
-                                         std::size_t lastLeaf, Progress* progress);
+OrientedGroups orientedGroups(const Mesh& mesh, const BoxTree& boxes, const LargeArray<TriangleLeaf>& leaves,
+                              std::size_t lastLeaf, Progress* progress);
 
 }  // namespace bilayer::detail

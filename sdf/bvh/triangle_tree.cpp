@@ -159,7 +159,7 @@ void TriangleTree::build(std::vector<TreeItem> order, Progress* progress) {
         boxes_.setLeafBox(index, box.lower, box.upper);
     });
     boxes_.joinBoxes(progress);
-    oriented_ = orientedGroups(boxes_, leaves_, leafSize(leaves_.size() - 1), progress);
+    oriented_ = orientedGroups(mesh_, boxes_, leaves_, leafSize(leaves_.size() - 1), progress);
     const BoxGroup& root = boxes_.group(boxes_.root());
     for (int k = 0; k < 3; ++k)
         for (int i = 0; i < treeWidth; ++i)

@@ -64,7 +64,11 @@ class TriangleTree {
     /// Returns the oriented boxes of a group, or null if it has none.
     const OrientedGroup* orientedGroup(std::uint32_t node) const {
         const std::size_t group = node - boxes_.leafCount;
-        return group < oriented_.size() ? &oriented_[group] : nullptr;
+        return group < oriented_.groups.size() ? &oriented_.groups[group] : nullptr;
+    }
+    /// Returns the fans of an oriented group, or null if it has none.
+    const FanGroup* fanGroup(const OrientedGroup& group) const {
+        return group.fans == noFans ? nullptr : &oriented_.fans[group.fans];
     }
     std::size_t triangleCount() const { return count_; }
     const TriangleLeaf& leaf(std::size_t index) const { return leaves_[index]; }
@@ -98,7 +102,7 @@ class TriangleTree {
     float largest_ = 0;  // max absolute coordinate [m]
     BoxTree boxes_;
     LargeArray<TriangleLeaf> leaves_;
-    LargeArray<OrientedGroup> oriented_;  // of the first groups
+    OrientedGroups oriented_;  // of the first groups
 };
 
 /// Returns directions that are evenly distributed over a hemisphere (a Fibonacci lattice). None is parallel to an axis.
