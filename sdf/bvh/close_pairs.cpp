@@ -187,7 +187,7 @@ class LeafPairs {
           pairs_(pairs) {
         if (const FanGroup* fans = tree.fanGroup(own_)) {
             vertex_ = fans->vertex[leaf % treeWidth];
-            edges_ = Interval(fans->lower, fans->upper, leaf % treeWidth);
+            edges_ = ChildBox(fans->lower, fans->upper, leaf % treeWidth);
         }
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
             const BoxLanes boxes = Lanes(leaf_, lane).boxes;
@@ -327,7 +327,7 @@ class LeafPairs {
     const std::uint32_t index_;
     const TriangleLeaf& leaf_;
     const OrientedGroup& own_;
-    Interval box_, edges_;             // along its axes: all of the leaf, and the edges opposite to the common vertex
+    ChildBox box_, edges_;             // along its axes: all of the leaf, and the edges opposite to the common vertex
     const float room_;                 // margin along axes [m]
     std::uint32_t vertex_ = noVertex;  // that all triangles of the leaf share
     alignas(64) float lower_[3][treeWidth], upper_[3][treeWidth];  // boxes of the leaf's triangles

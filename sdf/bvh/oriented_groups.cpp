@@ -72,7 +72,7 @@ void setAxes(const Leaves& leaves, OrientedGroup& group) {
         for (int i = 0; i < 3; ++i) group.axes[k][i] = std::isfinite(axes[k][i]) ? float(axes[k][i]) : float(k == i);
 }
 
-struct DoubleBounds {
+struct ProjectedBounds {
     glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-lower};
 
     void add(const glm::dvec3& p) {
@@ -87,7 +87,7 @@ std::int8_t roundedNormal(double scaled) {
 }
 
 template <class Group>
-void setBox(const DoubleBounds& box, std::size_t place, Group& group) {
+void setBox(const ProjectedBounds& box, std::size_t place, Group& group) {
     constexpr float infinity = std::numeric_limits<float>::infinity();
     for (int k = 0; k < 3; ++k) {
         group.lower[k][place] = std::nextafter(float(box.lower[k]), -infinity);
@@ -96,7 +96,7 @@ void setBox(const DoubleBounds& box, std::size_t place, Group& group) {
 }
 
 void setChild(const Leaves& leaves, std::size_t place, OrientedGroup& group) {
-    DoubleBounds box, normals;
+    ProjectedBounds box, normals;
     leaves.forEach([&](const TriangleLeaf& leaf, std::size_t i) {
         for (int corner = 0; corner < 3; ++corner) box.add(group.along(cornerOf(leaf, corner, i)));
         const glm::dvec3 normal = areaVector(leaf, i);
@@ -129,7 +129,7 @@ std::uint32_t commonVertex(const Mesh& mesh, const Leaves& leaves) {
 
 void setFan(const Mesh& mesh, const Leaves& leaves, std::size_t place, const OrientedGroup& group, FanGroup& fans) {
     fans.vertex[place] = commonVertex(mesh, leaves);
-    DoubleBounds box;
+    ProjectedBounds box;
     leaves.forEach([&](const TriangleLeaf& leaf, std::size_t i) {
         for (int corner = 0; corner < 3; ++corner)
             if (mesh.triangles[leaf.triangles[i]][corner] != fans.vertex[place])

@@ -21,10 +21,10 @@ namespace bilayer::detail::HWY_NAMESPACE {
 namespace {
 
 // The bounds of a child along the axes of its group.
-struct Interval {
+struct ChildBox {
     float lower[3], upper[3];
 
-    Interval(const float (&from)[3][treeWidth], const float (&to)[3][treeWidth], std::size_t place) {
+    ChildBox(const float (&from)[3][treeWidth], const float (&to)[3][treeWidth], std::size_t place) {
         for (int k = 0; k < 3; ++k) lower[k] = from[k][place], upper[k] = to[k][place];
     }
 };
@@ -41,7 +41,7 @@ class Rotation {
     }
 
     // Returns a bit for each box of the other group, from a lane on, that meets a box of the own group.
-    unsigned met(const Interval& own, const float (&lower)[3][treeWidth], const float (&upper)[3][treeWidth],
+    unsigned met(const ChildBox& own, const float (&lower)[3][treeWidth], const float (&upper)[3][treeWidth],
                  std::size_t lane) const {
         const Tag tag;
         Mask meets = hn::FirstN(tag, treeWidth);
