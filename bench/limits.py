@@ -18,6 +18,7 @@ import numpy as np
 MILLIONS = 20  # triangles of the largest mesh
 COMPONENTS = 100_000
 NESTED = 2_000  # components in each other
+GROWTH = 4  # sizes for each kind of mesh that would be slow if time grew with the square; each twice the one before
 MAX_SECONDS = 600  # of processor time
 TETRAHEDRON = (np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
 
@@ -37,6 +38,70 @@ def tetrahedra(path, places, sizes):
     all_points = places[:, None, :] + sizes[:, None, None] * points
     all_triangles = triangles + 4 * np.arange(len(places))[:, None, None]
     return write_ply(path, all_points.reshape(-1, 3), all_triangles.reshape(-1, 3))
+
+
+def octahedra(path, centres, sizes, opened=0):
+    """Octahedra whose faces are divided into four each, without the last `opened` triangles of each."""
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    points, triangles = list(corners), []
+    middle = lambda a, b: (points.append(np.array(a) + np.array(b)), len(points) - 1)[1]
+    for signs in np.ndindex(2, 2, 2):
+        a, b, c = (axis + 3 * sign for axis, sign in enumerate(signs))
+        if sum(signs) % 2:
+            b, c = c, b
+        ab, bc, ca = (middle(corners[i] / np.sqrt(2), corners[k] / np.sqrt(2)) for i, k in ((a, b), (b, c), (c, a)))
+        triangles += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    points, triangles = np.array(points), np.array(triangles)[: len(triangles) - opened]
+    all_points = centres[:, None, :] + sizes[:, None, None] * points
+    all_triangles = triangles + len(points) * np.arange(len(centres))[:, None, None]
+    return write_ply(path, all_points.reshape(-1, 3), all_triangles.reshape(-1, 3))
+
+
+def needles(path, start, count):
+    """Long thin tetrahedra from a distance of the centre outward, in all directions."""
+    along = np.random.default_rng(1).normal(size=(count, 3))
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    u = np.cross(along, [0.3, 0.5, 0.8])
+    u *= 0.2 / np.sqrt(count) / np.linalg.norm(u, axis=1)[:, None]
+    v = np.cross(along, u)
+    points = np.stack([start * along, along + u, along - 0.5 * u + 0.8 * v, along - 0.5 * u - 0.8 * v], axis=1)
+    all_triangles = TETRAHEDRON[1] + 4 * np.arange(count)[:, None, None]
+    return write_ply(path, points.reshape(-1, 3), all_triangles.reshape(-1, 3))
+
+
+def star(path, rays):
+    """A flat closed star of two poles, whose rim goes in and out."""
+    angle, radius = np.pi * np.arange(2 * rays) / rays, np.where(np.arange(2 * rays) % 2, 1.0, 0.02)
+    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle], axis=1)
+    i = np.arange(2 * rays)
+    k, pole = np.roll(i, -1), np.full(2 * rays, 2 * rays)
+    return write_ply(path, np.vstack([rim, [[0, 0, 0.1], [0, 0, -0.1]]]),
+                     np.vstack([np.stack([i, k, pole], axis=1), np.stack([k, i, pole + 1], axis=1)]))
+
+
+def cells(count):
+    """Places on a lattice of the unit cube, and its spacing."""
+    side = int(np.ceil(count ** (1 / 3)))
+    return np.stack(np.unravel_index(np.arange(count), (side, side, side)), axis=1) / side, 1 / side
+
+
+def shell(path, count):
+    """One octahedron around many."""
+    centres, spacing = cells(count)
+    return octahedra(path, np.vstack([centres, [[0.5, 0.5, 0.5]]]), np.append(np.full(count, 0.3 * spacing), 4))
+
+
+def growing(folder):
+    """Kinds of meshes: a title, the first size, and a function of a path and a size."""
+    zeros, sizes = lambda n: np.zeros((n, 3)), lambda n: 1 + np.arange(n) / n
+    yield "octahedra in each other", 2_000, lambda path, n: octahedra(path, zeros(n), sizes(n))
+    yield "open octahedra in each other", 2_000, lambda path, n: octahedra(path, zeros(n), sizes(n), opened=4)
+    yield "octahedra in one", 10_000, shell
+    yield "tetrahedra next to each other", 25_000, lambda path, n: tetrahedra(path, 2 * cells(n)[0], np.full(n, cells(n)[1]))
+    yield "needles from one point", 4_000, lambda path, n: needles(path, 0, n)
+    yield "needles from around a point", 4_000, lambda path, n: needles(path, 0.05, n)
+    yield "rays of one star", 4_000, star
+    yield "tetrahedra that share three planes", 250, lambda path, n: tetrahedra(path, zeros(n), sizes(n))
 
 
 def meshes(folder):
@@ -106,13 +171,23 @@ def measure(program, words, folder):
     return process.returncode, seconds, usage.ru_maxrss / 1024, text.replace(f"{folder}/", "").strip().split("\n")[-1]
 
 
+def measure_growth(program, folder):
+    print("| input | components | `inspect` [s] |\n|---|---|---|")
+    for title, first, make in growing(folder):
+        counts = [first << i for i in range(GROWTH)]
+        seconds = [f"{measure(program, ['inspect', make(folder / 'growing.ply', n)], folder)[1]:.2f}" for n in counts]
+        print(f"| {title} | {', '.join(f'{n:,}' for n in counts)} | {', '.join(seconds)} |", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("program", help="bilayer")
-    parser.add_argument("chosen", nargs="*", help="measure only rows that have one of these words")
+    parser.add_argument("chosen", nargs="*", help="measure only rows that have one of these words; growth: instead, how time grows")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        if "growth" in arguments.chosen:
+            return measure_growth(arguments.program, folder)
         mesh = meshes(folder)
         print("| input | command | status | time [s] | memory [MiB] | last line |\n|---|---|---|---|---|---|")
         for title, words in cases(mesh):

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "collider/field/jacobi_rotation.h"
+#include "sdf/base/jacobi_rotation.h"
 #include "collider/field/moments.h"
 #include "sdf/mesh/unite.h"
 

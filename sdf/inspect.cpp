@@ -21,6 +21,7 @@
 #include "sdf/base/welding.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/mesh/orient.h"
+#include "sdf/mesh/part_nesting.h"
 #include "sdf/mesh/self_intersection.h"
 #include "sdf/mesh/topology.h"
 #include "sdf/mesh/wall_thickness.h"
@@ -177,10 +178,13 @@ std::size_t countInsideOut(const Mesh& mesh, const TriangleTree& tree, std::vect
     if (all.size() == 1) return all[0].closed && all[0].volume < 0;
     for (unsigned& component : of)
         if (!all[component].closed) component = noPart;
-    const auto enclosing = enclosingParts(mesh, tree, of, all.size(), &progress);
+    const PartNesting nesting(mesh, tree, of, all.size(), &progress);
+    std::vector<std::size_t> inherited(all.size());
     std::size_t wrong = 0;
-    for (std::size_t i = 0; i < all.size(); ++i)
-        wrong += all[i].closed && (all[i].volume < 0) != (enclosing[i].size() % 2 == 1);
+    for (const unsigned part : nesting.largestFirst()) {
+        const std::size_t containers = nesting.sum(part, inherited, [](unsigned) { return std::size_t(1); });
+        wrong += all[part].closed && (all[part].volume < 0) != (containers % 2 == 1);
+    }
     return wrong;
 }
 

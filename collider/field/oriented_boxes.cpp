@@ -12,7 +12,7 @@
 #include <glm/mat3x3.hpp>
 #include <limits>
 
-#include "collider/field/jacobi_rotation.h"
+#include "sdf/base/jacobi_rotation.h"
 
 namespace bilayer::detail {
 namespace {

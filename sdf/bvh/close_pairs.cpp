@@ -10,6 +10,7 @@
 
 #include <bit>
 
+#include "sdf/bvh/rotated_boxes.h"
 #include "sdf/bvh/tree_lanes.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -22,6 +23,8 @@ using IndexTag = hn::RebindToUnsigned<Tag>;
 /// Rounding error of a volume in floats, relative to the sum of the absolute values of its products: eight roundings
 /// plus a margin.
 constexpr float roundingOfVolume = 1e-6f;
+/// Rounding error of a coordinate along an oblique axis in floats, relative to the max coordinate; generous.
+constexpr float roundingOfPlaces = 4e-6f;
 /// Upper bound on what underflow of products loses.
 constexpr float minProduct = 1e-30f, minVolume = 1e-37f;
 
@@ -173,7 +176,19 @@ class LeafPairs {
   public:
     LeafPairs(const Mesh& mesh, const TriangleTree& tree, std::uint32_t leaf,
               std::vector<std::pair<unsigned, unsigned>>& pairs)
-        : mesh_(mesh), tree_(tree), index_(leaf), leaf_(tree.leaf(leaf)), pairs_(pairs) {
+        : mesh_(mesh),
+          tree_(tree),
+          index_(leaf),
+          leaf_(tree.leaf(leaf)),
+          own_(*tree.orientedGroup(tree.boxes().leafCount + leaf / treeWidth)),
+          box_(own_.lower, own_.upper, leaf % treeWidth),
+          edges_(box_),
+          room_(roundingOfPlaces * tree.largestCoordinate()),
+          pairs_(pairs) {
+        if (const FanGroup* fans = tree.fanGroup(own_)) {
+            vertex_ = fans->vertex[leaf % treeWidth];
+            edges_ = ChildBox(fans->lower, fans->upper, leaf % treeWidth);
+        }
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
             const BoxLanes boxes = Lanes(leaf_, lane).boxes;
             store(boxes.lower, lower_, lane);
@@ -195,7 +210,10 @@ class LeafPairs {
         const BoxGroup& group = tree_.boxes().group(node);
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
             const BoxLanes boxes(loadLanes(Tag(), group.lower, lane), loadLanes(Tag(), group.upper, lane));
-            for (unsigned bits = bitsOf(hn::AndNot(boxes.share(own), boxes.meet(own))); bits != 0; bits &= bits - 1) {
+            unsigned bits = bitsOf(hn::AndNot(boxes.share(own), boxes.meet(own)));
+            if (bits != 0)
+                if (const OrientedGroup* oriented = tree_.orientedGroup(node)) bits &= inOriented(*oriented, lane);
+            for (; bits != 0; bits &= bits - 1) {
                 const std::size_t place = lane + std::size_t(std::countr_zero(bits));
                 const std::uint32_t child = group.firstChild + std::uint32_t(place);
                 if (!tree_.boxes().isLeaf(child))
@@ -210,6 +228,58 @@ class LeafPairs {
         hn::Store(points.x, Tag(), to[0] + lane);
         hn::Store(points.y, Tag(), to[1] + lane);
         hn::Store(points.z, Tag(), to[2] + lane);
+    }
+
+    // Returns a bit for each child of a group, from a lane on, whose triangles may meet those of the leaf.
+    unsigned inOriented(const OrientedGroup& group, std::size_t lane) const {
+        const Rotation rotation(own_, group, room_);
+        const unsigned bits = reached(group, lane) & rotation.met(box_, group.lower, group.upper, lane);
+        const FanGroup* fans = tree_.fanGroup(group);
+        if (bits == 0 || vertex_ == noVertex || !fans) return bits;
+        unsigned sameFan = 0;
+        for (std::size_t i = 0; lane + i < treeWidth; ++i) sameFan |= unsigned(fans->vertex[lane + i] == vertex_) << i;
+        return bits & (~sameFan | rotation.met(edges_, group.lower, group.upper, lane) |
+                       rotation.met(box_, fans->lower, fans->upper, lane));
+    }
+
+    // Returns the lanes whose triangles meet the leaf's box along its own axes.
+    Mask alongAxes(const Lanes& lanes) const {
+        const Tag tag;
+        Mask meets = hn::FirstN(tag, treeWidth);
+        for (int k = 0; k < 3; ++k) {
+            const PointLanes axis = axisLanes(own_, k);
+            const Vec a = dot(lanes.corners[0], axis), b = dot(lanes.corners[1], axis), c = dot(lanes.corners[2], axis);
+            meets = hn::And(meets, hn::And(hn::Le(BoxLanes::smallest(a, b, c), hn::Set(tag, box_.upper[k] + room_)),
+                                           hn::Ge(BoxLanes::largest(a, b, c), hn::Set(tag, box_.lower[k] - room_))));
+        }
+        return meets;
+    }
+
+    static PointLanes axisLanes(const OrientedGroup& group, int k) {
+        const Tag tag;
+        return {hn::Set(tag, group.axes[k][0]), hn::Set(tag, group.axes[k][1]), hn::Set(tag, group.axes[k][2])};
+    }
+
+    // Returns a bit for each oriented box of a group, from a lane on, that the leaf's corners reach.
+    unsigned reached(const OrientedGroup& group, std::size_t lane) const {
+        const Tag tag;
+        Mask meets = hn::FirstN(tag, treeWidth);
+        const Vec room = hn::Set(tag, room_);
+        for (int k = 0; k < 3; ++k) {
+            const PointLanes axis = axisLanes(group, k);
+            Vec low = dot(loadLanes(tag, leaf_.corners[0], 0), axis), high = low;
+            for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag))
+                for (const auto& corner : leaf_.corners) {
+                    const Vec at = dot(loadLanes(tag, corner, i), axis);
+                    low = hn::Min(low, at);
+                    high = hn::Max(high, at);
+                }
+            low = hn::Sub(hn::MinOfLanes(tag, low), room);
+            high = hn::Add(hn::MaxOfLanes(tag, high), room);
+            meets = hn::And(meets, hn::And(hn::Le(hn::Load(tag, group.lower[k] + lane), high),
+                                           hn::Ge(hn::Load(tag, group.upper[k] + lane), low)));
+        }
+        return bitsOf(meets);
     }
 
     // Returns the triangles of the leaf whose boxes overlap a box.
@@ -228,7 +298,9 @@ class LeafPairs {
         const std::size_t count = tree_.leafSize(other);
         for (std::size_t lane = 0; lane < count; lane += hn::Lanes(tag)) {
             const Lanes lanes(leaf, lane);
-            const Mask near = hn::And(hn::FirstN(tag, count - lane), lanes.boxes.meet(own));
+            const Mask inBoxes = hn::And(hn::FirstN(tag, count - lane), lanes.boxes.meet(own));
+            if (hn::AllFalse(tag, inBoxes)) continue;
+            const Mask near = hn::And(inBoxes, alongAxes(lanes));
             if (hn::AllFalse(tag, near)) continue;
             const Others others(mesh_, leaf, lane, lanes);
             for (unsigned bits = mine; bits != 0; bits &= bits - 1)
@@ -254,6 +326,10 @@ class LeafPairs {
     const TriangleTree& tree_;
     const std::uint32_t index_;
     const TriangleLeaf& leaf_;
+    const OrientedGroup& own_;
+    ChildBox box_, edges_;             // along its axes: all of the leaf, and the edges opposite to the common vertex
+    const float room_;                 // margin along axes [m]
+    std::uint32_t vertex_ = noVertex;  // that all triangles of the leaf share
     alignas(64) float lower_[3][treeWidth], upper_[3][treeWidth];  // boxes of the leaf's triangles
     std::vector<std::pair<unsigned, unsigned>>& pairs_;
 };

@@ -42,24 +42,46 @@ class RaySlabs {
         }
     }
 
-    // Pushes the children of a group that the ray enters within a limit. Their keys are where it does.
-    void pushMet(const BoxGroup& group, float limit, NodeStack& stack) const {
-        const Tag tag;
+    // The children of a group that the ray meets within a limit: a bit for each, and where it enters and leaves it.
+    struct Met {
         alignas(64) float enters[treeWidth];
-        unsigned met = 0;
+        alignas(64) float leaves[treeWidth];
+        unsigned bits = 0;
+
+        // Keeps the children that the ray meets both here and there, where it is in both boxes.
+        void intersect(const Met& other) {
+            bits &= other.bits;
+            for (std::size_t i = 0; i < treeWidth; ++i) {
+                enters[i] = std::max(enters[i], other.enters[i]);
+                leaves[i] = std::min(leaves[i], other.leaves[i]);
+                if (enters[i] > leaves[i] * quotientRoundUp) bits &= ~(1u << i);
+            }
+        }
+    };
+
+    Met met(const float (&lower)[3][treeWidth], const float (&upper)[3][treeWidth], float limit) const {
+        const Tag tag;
+        Met found;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             Vec enter = hn::Zero(tag), leave = hn::Set(tag, limit);
             for (int k = 0; k < 3; ++k) {
-                const float* first = forward_[k] ? group.lower[k] : group.upper[k];
-                const float* second = forward_[k] ? group.upper[k] : group.lower[k];
+                const float* first = forward_[k] ? lower[k] : upper[k];
+                const float* second = forward_[k] ? upper[k] : lower[k];
                 const Vec per = hn::Set(tag, perDirection_[k]);
                 enter = hn::Max(enter, hn::Mul(hn::Sub(hn::Load(tag, first + i), hn::Set(tag, nearOrigin_[k])), per));
                 leave = hn::Min(leave, hn::Mul(hn::Sub(hn::Load(tag, second + i), hn::Set(tag, farOrigin_[k])), per));
             }
-            hn::Store(enter, tag, enters + i);
-            met |= bitsOf(hn::Le(enter, hn::Mul(leave, hn::Set(tag, quotientRoundUp)))) << i;
+            hn::Store(enter, tag, found.enters + i);
+            hn::Store(leave, tag, found.leaves + i);
+            found.bits |= bitsOf(hn::Le(enter, hn::Mul(leave, hn::Set(tag, quotientRoundUp)))) << i;
         }
-        stack.pushChildren(met, enters, group.firstChild);
+        return found;
+    }
+
+    // Pushes the children of a group that the ray enters within a limit. Their keys are where it does.
+    void pushMet(const BoxGroup& group, float limit, NodeStack& stack) const {
+        const Met found = met(group.lower, group.upper, limit);
+        stack.pushChildren(found.bits, found.enters, group.firstChild);
     }
 
   private:

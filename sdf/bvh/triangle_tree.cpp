@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/bvh/triangle_tree.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
-#include <glm/vector_relational.hpp>
 #include <limits>
+#include <utility>
 
 #include "sdf/base/polled_loop.h"
 
@@ -20,57 +18,30 @@ namespace {
 constexpr std::size_t grain = 1024;  // leaves or triangles per task
 /// Rounding error of a box test in double precision, relative to the max coordinate; generous.
 constexpr double roundingOfBoxes = 1e-12;
-/// Count of lines that vote on whether a part lies within another: odd, and more than one in case a line hits an edge.
-constexpr std::size_t votes = 3;
+/// Minimum speed of a line along an axis: with it, the line stays between two planes for longer than any box is wide.
+constexpr double minSpeed = 1e-30;
 
-// Returns the triangles in the order of the tree.
-std::vector<TreeItem> sortedTriangles(const Mesh& mesh, Progress* progress) {
-    auto items = vectorOf<TreeItem>(mesh.triangles.size(), progress);
-    forAllPolled(items.size(), grain, progress, [&](std::size_t i) {
-        const glm::uvec3& t = mesh.triangles[i];
-        items[i] = {mesh.points[t.x] + mesh.points[t.y] + mesh.points[t.z], unsigned(i)};
-    });
-    sortBySplitting(items, progress);
-    return items;
-}
-
-bool holds(const Bounds& outer, const Bounds& inner) {
-    return glm::all(glm::lessThanEqual(outer.lower, inner.lower)) &&
-           glm::all(glm::greaterThanEqual(outer.upper, inner.upper));
-}
-
-glm::dvec3 centroid(const Mesh& mesh, unsigned triangle) {
+TreeItem itemOf(const Mesh& mesh, unsigned triangle) {
     const glm::uvec3& t = mesh.triangles[triangle];
-    return (glm::dvec3(mesh.points[t.x]) + glm::dvec3(mesh.points[t.y]) + glm::dvec3(mesh.points[t.z])) / 3.0;
+    return {mesh.points[t.x] + mesh.points[t.y] + mesh.points[t.z], triangle};
 }
 
 // The part of a line beyond a position, and a plane perpendicular to it onto which triangles are projected.
 class LineSearch {
   public:
     LineSearch(const glm::dvec3& from, const glm::dvec3& along, double first, double slack)
-        : origin_(from), direction_(along), inverse_(1.0 / along), first_(first), slack_(slack) {
+        : origin_(from), direction_(along), inverse_(inverse(along)), first_(first), slack_(slack) {
         const glm::dvec3 helper = std::abs(along.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
         u_ = glm::normalize(glm::cross(along, helper));
         v_ = glm::cross(along, u_);
     }
 
     // Returns a bit for each box of a group that the line meets.
-    unsigned met(const BoxGroup& group) const {
-        double enter[treeWidth], exit[treeWidth];
-        std::fill_n(enter, treeWidth, first_);
-        std::fill_n(exit, treeWidth, std::numeric_limits<double>::infinity());
-        for (int axis = 0; axis < 3; ++axis)
-            for (int i = 0; i < treeWidth; ++i) {
-                const double a = (double(group.lower[axis][i]) - slack_ - origin_[axis]) * inverse_[axis];
-                const double b = (double(group.upper[axis][i]) + slack_ - origin_[axis]) * inverse_[axis];
-                const double low = a < b ? a : b, high = a < b ? b : a;
-                enter[i] = enter[i] < low ? low : enter[i];
-                exit[i] = exit[i] > high ? high : exit[i];
-            }
-        unsigned bits = 0;
-        for (int i = 0; i < treeWidth; ++i)
-            if (enter[i] <= exit[i] && group.lower[0][i] <= group.upper[0][i]) bits |= 1u << i;
-        return bits;
+    unsigned met(const BoxGroup& group, const OrientedGroup* oriented) const {
+        const unsigned bits = met(group.lower, group.upper, origin_, inverse_);
+        if (bits == 0 || !oriented) return bits;
+        return bits &
+               met(oriented->lower, oriented->upper, oriented->along(origin_), inverse(oriented->along(direction_)));
     }
 
     // Adds the crossings of a leaf's triangles. Returns false if the line hits an edge exactly.
@@ -104,6 +75,32 @@ class LineSearch {
         double at[treeWidth];
     };
 
+    static glm::dvec3 inverse(const glm::dvec3& direction) {
+        glm::dvec3 result;
+        for (int k = 0; k < 3; ++k)
+            result[k] = 1 / std::copysign(std::max(std::abs(direction[k]), minSpeed), direction[k]);
+        return result;
+    }
+
+    unsigned met(const float (&lower)[3][treeWidth], const float (&upper)[3][treeWidth], const glm::dvec3& origin,
+                 const glm::dvec3& inverse) const {
+        double enter[treeWidth], exit[treeWidth];
+        std::fill_n(enter, treeWidth, first_);
+        std::fill_n(exit, treeWidth, std::numeric_limits<double>::infinity());
+        for (int axis = 0; axis < 3; ++axis)
+            for (int i = 0; i < treeWidth; ++i) {
+                const double a = (double(lower[axis][i]) - slack_ - origin[axis]) * inverse[axis];
+                const double b = (double(upper[axis][i]) + slack_ - origin[axis]) * inverse[axis];
+                const double low = a < b ? a : b, high = a < b ? b : a;
+                enter[i] = enter[i] < low ? low : enter[i];
+                exit[i] = exit[i] > high ? high : exit[i];
+            }
+        unsigned bits = 0;
+        for (int i = 0; i < treeWidth; ++i)
+            if (enter[i] <= exit[i] && lower[0][i] <= upper[0][i]) bits |= 1u << i;
+        return bits;
+    }
+
     void project(const float (&corner)[3][treeWidth], const glm::dvec3& axis, Lanes& to) const {
         for (int i = 0; i < treeWidth; ++i)
             to.at[i] = (double(corner[0][i]) - origin_.x) * axis.x + (double(corner[1][i]) - origin_.y) * axis.y +
@@ -126,33 +123,25 @@ class LineSearch {
     double first_, slack_;
 };
 
-// Returns the parts that a ray from the point crosses an odd number of times, in order.
-std::vector<unsigned> oddParts(const TriangleTree& tree, const glm::dvec3& point, const glm::dvec3& direction,
-                               std::span<const unsigned> partOf) {
-    std::vector<Crossing> found;
-    tree.crossings(point, direction, found);
-    std::vector<unsigned> parts, odd;
-    for (const Crossing& crossing : found)
-        if (crossing.along > 0 && partOf[crossing.triangle] != noPart) parts.push_back(partOf[crossing.triangle]);
-    std::sort(parts.begin(), parts.end());
-    for (std::size_t i = 0, j; i < parts.size(); i = j) {
-        for (j = i; j < parts.size() && parts[j] == parts[i];) ++j;
-        if ((j - i) % 2) odd.push_back(parts[i]);
-    }
-    return odd;
-}
-
-std::vector<unsigned> common(const std::vector<unsigned>& a, const std::vector<unsigned>& b) {
-    std::vector<unsigned> both;
-    std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(both));
-    return both;
-}
-
 }  // namespace
 
-TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh) {
-    if (mesh.triangles.empty()) return;
-    const std::vector<TreeItem> order = sortedTriangles(mesh, progress);
+TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh), count_(mesh.triangles.size()) {
+    auto items = vectorOf<TreeItem>(count_, progress);
+    forAllPolled(count_, grain, progress, [&](std::size_t i) { items[i] = itemOf(mesh, unsigned(i)); });
+    build(std::move(items), progress);
+}
+
+TriangleTree::TriangleTree(const Mesh& mesh, std::span<const unsigned> triangles)
+    : mesh_(mesh), count_(triangles.size()) {
+    std::vector<TreeItem> items;
+    items.reserve(count_);
+    for (const unsigned triangle : triangles) items.push_back(itemOf(mesh, triangle));
+    build(std::move(items), nullptr);
+}
+
+void TriangleTree::build(std::vector<TreeItem> order, Progress* progress) {
+    if (order.empty()) return;
+    sortBySplitting(order, progress);
     boxes_.makeRoom((order.size() + treeWidth - 1) / treeWidth);
     leaves_ = LargeArray<TriangleLeaf>(boxes_.leafCount);
     forAllPolled(leaves_.size(), grain, progress, [&](std::size_t index) {
@@ -162,7 +151,7 @@ TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh) {
             const std::uint32_t triangle = order[std::min(index * treeWidth + i, order.size() - 1)].index;
             leaf.triangles[i] = triangle;
             for (int corner = 0; corner < 3; ++corner) {
-                const glm::vec3& p = mesh.points[mesh.triangles[triangle][corner]];
+                const glm::vec3& p = mesh_.points[mesh_.triangles[triangle][corner]];
                 for (int k = 0; k < 3; ++k) leaf.corners[corner][k][i] = p[k];
                 box.add(p);
             }
@@ -170,6 +159,7 @@ TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh) {
         boxes_.setLeafBox(index, box.lower, box.upper);
     });
     boxes_.joinBoxes(progress);
+    oriented_ = orientedGroups(mesh_, boxes_, leaves_, leafSize(leaves_.size() - 1), progress);
     const BoxGroup& root = boxes_.group(boxes_.root());
     for (int k = 0; k < 3; ++k)
         for (int i = 0; i < treeWidth; ++i)
@@ -189,7 +179,7 @@ bool TriangleTree::crossings(const glm::dvec3& origin, const glm::dvec3& directi
             return;
         }
         const BoxGroup& group = boxes_.group(node);
-        for (unsigned bits = line.met(group); bits != 0; bits &= bits - 1)
+        for (unsigned bits = line.met(group, orientedGroup(node)); bits != 0; bits &= bits - 1)
             self(self, group.firstChild + std::uint32_t(std::countr_zero(bits)));
     };
     visit(visit, boxes_.root());
@@ -205,32 +195,6 @@ std::vector<glm::dvec3> spreadDirections(std::size_t count) {
         directions.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
     }
     return directions;
-}
-
-std::vector<std::vector<unsigned>> enclosingParts(const Mesh& mesh, const TriangleTree& tree,
-                                                  std::span<const unsigned> partOf, std::size_t parts,
-                                                  Progress* progress) {
-    std::vector<std::vector<unsigned>> members(parts), enclosing(parts);
-    std::vector<Bounds> boxes(parts);
-    for (const unsigned i : Polled(partOf.size(), progress)) {
-        if (partOf[i] == noPart) continue;
-        members[partOf[i]].push_back(i);
-        for (int k = 0; k < 3; ++k) boxes[partOf[i]].add(mesh.points[mesh.triangles[i][k]]);
-    }
-    if (parts < 2) return enclosing;
-    const std::vector<glm::dvec3> directions = spreadDirections(votes);
-    tbb::parallel_for(std::size_t(0), parts, [&](std::size_t part) {
-        if (members[part].empty()) return;
-        poll(progress);
-        for (std::size_t vote = 0; vote < votes; ++vote) {
-            const unsigned triangle = members[part][vote * members[part].size() / votes];
-            const auto odd = oddParts(tree, centroid(mesh, triangle), directions[vote], partOf);
-            enclosing[part] = vote ? common(enclosing[part], odd) : odd;
-        }
-        std::erase_if(enclosing[part],
-                      [&](unsigned outer) { return outer == part || !holds(boxes[outer], boxes[part]); });
-    });
-    return enclosing;
 }
 
 }  // namespace bilayer::detail

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bounding volume hierarchy over the triangles of a mesh. It finds the triangles that overlap a box or a line, and
-// the parts of a mesh that lie within other parts. Boxes and corners are those of the mesh, without rounding.
+// A bounding volume hierarchy over the triangles of a mesh. It finds the triangles that overlap a box or a line.
+// Boxes and corners are those of the mesh, without rounding.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +13,7 @@
 #include <bilayer/sdf/mesh.h>
 #include "sdf/base/large_array.h"
 #include "sdf/bvh/box_tree.h"
+#include "sdf/bvh/oriented_groups.h"
 
 namespace bilayer::detail {
 
@@ -36,6 +37,8 @@ class TriangleTree {
     /// Keeps a reference to the mesh, which must be valid.
     /// @param progress  polled, unless null
     explicit TriangleTree(const Mesh& mesh, Progress* progress = nullptr);
+    /// A hierarchy over some of the mesh's triangles.
+    TriangleTree(const Mesh& mesh, std::span<const unsigned> triangles);
 
     /// Calls visit(triangle) for each triangle whose bounding box satisfies meets(box). If meets() holds for a box, it
     /// must hold for any box that contains it.
@@ -58,11 +61,20 @@ class TriangleTree {
     }
 
     const BoxTree& boxes() const { return boxes_; }
-    std::size_t triangleCount() const { return mesh_.triangles.size(); }
+    /// Returns the oriented boxes of a group, or null if it has none.
+    const OrientedGroup* orientedGroup(std::uint32_t node) const {
+        const std::size_t group = node - boxes_.leafCount;
+        return group < oriented_.groups.size() ? &oriented_.groups[group] : nullptr;
+    }
+    /// Returns the fans of an oriented group, or null if it has none.
+    const FanGroup* fanGroup(const OrientedGroup& group) const {
+        return group.fans == noFans ? nullptr : &oriented_.fans[group.fans];
+    }
+    std::size_t triangleCount() const { return count_; }
     const TriangleLeaf& leaf(std::size_t index) const { return leaves_[index]; }
     /// Returns the count of triangles in a leaf. Only the last leaf may have unused slots.
     std::size_t leafSize(std::size_t index) const {
-        return index + 1 < leaves_.size() ? std::size_t(treeWidth) : mesh_.triangles.size() - index * treeWidth;
+        return index + 1 < leaves_.size() ? std::size_t(treeWidth) : count_ - index * treeWidth;
     }
     /// Returns the max absolute coordinate [m].
     float largestCoordinate() const { return largest_; }
@@ -83,23 +95,17 @@ class TriangleTree {
         }
     }
 
+    void build(std::vector<TreeItem> items, Progress* progress);
+
     const Mesh& mesh_;
+    std::size_t count_;  // of triangles
     float largest_ = 0;  // max absolute coordinate [m]
     BoxTree boxes_;
     LargeArray<TriangleLeaf> leaves_;
+    OrientedGroups oriented_;  // of the first groups
 };
 
 /// Returns directions that are evenly distributed over a hemisphere (a Fibonacci lattice). None is parallel to an axis.
 std::vector<glm::dvec3> spreadDirections(std::size_t count);
-
-inline constexpr unsigned noPart = ~0u;
-
-/// For each part of a mesh, finds the parts that contain it. A part contains another if lines from three triangles of
-/// the other cross it an odd number of times, and if its box contains the other's box. Orientation does not matter.
-/// @param partOf    the part of each triangle; `noPart` for triangles to ignore
-/// @param progress  polled, unless null
-std::vector<std::vector<unsigned>> enclosingParts(const Mesh& mesh, const TriangleTree& tree,
-                                                  std::span<const unsigned> partOf, std::size_t parts,
-                                                  Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

@@ -10,6 +10,7 @@
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/mesh/consistent_triangles.h"
 #include "sdf/mesh/oriented_components.h"
+#include "sdf/mesh/part_nesting.h"
 #include "sdf/mesh/side_classification.h"
 
 namespace bilayer::detail {
@@ -21,15 +22,28 @@ constexpr std::size_t samplesOfComponent = 32;
 /// Each pass resolves one level of nested uncertain open components. More than a few passes are not worth the time.
 constexpr int maxPasses = 8;
 
-bool isInsideOut(std::span<const OrientedComponent> all, unsigned component, const std::vector<unsigned>& enclosing) {
-    const OrientedComponent& own = all[component];
-    int winding = 0;
-    bool trusted = !own.mixed;
-    for (const unsigned outer : enclosing) {
-        winding += all[outer].volume > 0 ? 1 : -1;
-        trusted &= !all[outer].mixed && !all[outer].flipped;
+// Sums over the components around a component.
+struct Surroundings {
+    int winding = 0, untrusted = 0;
+
+    explicit Surroundings(int value) : winding(value), untrusted(value) {}
+    Surroundings(const OrientedComponent& outer)
+        : winding(outer.volume > 0 ? 1 : -1), untrusted(outer.mixed || outer.flipped) {}
+    Surroundings& operator+=(const Surroundings& o) {
+        winding += o.winding;
+        untrusted += o.untrusted;
+        return *this;
     }
-    return winding <= 0 ? own.volume < 0 : !trusted && own.volume > 0;
+    Surroundings& operator-=(const Surroundings& o) {
+        winding -= o.winding;
+        untrusted -= o.untrusted;
+        return *this;
+    }
+};
+
+bool isInsideOut(const OrientedComponent& own, const Surroundings& around) {
+    const bool trusted = !own.mixed && around.untrusted == 0;
+    return around.winding <= 0 ? own.volume < 0 : !trusted && own.volume > 0;
 }
 
 // An open component may be the wall of a bore, with the solid on the other side. The rest of the mesh then decides.
@@ -42,21 +56,23 @@ bool boundsSolid(const OrientedComponent& component, const Sides& sides) {
 void flipInsideOut(const Mesh& mesh, const ConsistentTriangles& consistent, OrientedComponents& components,
                    Progress* progress) {
     const std::span<const OrientedComponent> all = components.all();
-    std::vector<unsigned> bounding, partOf(mesh.triangles.size(), noPart);
-    for (unsigned c = 0; c < all.size(); ++c)
-        if (all[c].bounding()) bounding.push_back(c);
-    std::stable_sort(bounding.begin(), bounding.end(), [&](unsigned a, unsigned b) {
-        return glm::length(all[a].bounds.size()) > glm::length(all[b].bounds.size());
-    });
-    for (const unsigned c : bounding)
+    std::vector<unsigned> partOf(mesh.triangles.size(), noPart);
+    bool some = false;
+    for (unsigned c = 0; c < all.size(); ++c) {
+        if (!all[c].bounding()) continue;
+        some = true;
         for (const unsigned i : all[c].triangles)
             if (consistent.encloses(i)) partOf[i] = c;
-    if (bounding.empty()) return;
+    }
+    if (!some) return;
     const TriangleTree tree(mesh, progress);
-    const auto enclosing = enclosingParts(mesh, tree, partOf, all.size(), progress);
+    const PartNesting nesting(mesh, tree, partOf, all.size(), progress);
     const Sides sides(mesh, tree, progress);
-    for (const unsigned c : bounding)
-        if (isInsideOut(all, c, enclosing[c]) && !boundsSolid(all[c], sides)) components.flip(c);
+    std::vector<Surroundings> inherited(all.size(), Surroundings(0));
+    for (const unsigned c : nesting.largestFirst()) {
+        const Surroundings around = nesting.sum(c, inherited, [&](unsigned outer) { return Surroundings(all[outer]); });
+        if (all[c].bounding() && isInsideOut(all[c], around) && !boundsSolid(all[c], sides)) components.flip(c);
+    }
 }
 
 Orientation orientOnce(const Mesh& mesh, Progress* progress) {

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -70,6 +71,8 @@ namespace {
 
 /// Rounding error of products in floats, relative to the absolute values of their factors; generous.
 constexpr float rounding = 2e-6f;
+/// Rounding error of the cosine between two unit vectors in floats; generous.
+constexpr float roundingOfFacing = 1e-5f;
 
 // A ray's search for its nearest exit.
 class ExitSearch {
@@ -77,19 +80,53 @@ class ExitSearch {
     ExitSearch(const TriangleTree& tree, const Ray& ray, float limit)
         : tree_(tree),
           ray_(ray),
-          slabs_(ray.origin, ray.direction, rounding * tree.largestCoordinate()),
+          slack_(rounding * tree.largestCoordinate()),
+          slabs_(ray.origin, ray.direction, slack_),
           nearest_(limit) {}
 
     float run() {
         const BoxTree& boxes = tree_.boxes();
         descend(
             boxes, boxes.root(), [&](float entry) { return entry > nearest_; },
-            [&](std::uint32_t group, NodeStack& stack) { slabs_.pushMet(boxes.groups[group], nearest_, stack); },
+            [&](std::uint32_t group, NodeStack& stack) { open(group, stack); },
             [&](std::uint32_t leaf) { return visit(tree_.leaf(leaf)), false; });
         return nearest_;
     }
 
   private:
+    void open(std::uint32_t index, NodeStack& stack) const {
+        const BoxGroup& group = tree_.boxes().groups[index];
+        RaySlabs::Met met = slabs_.met(group.lower, group.upper, nearest_);
+        const OrientedGroup* oriented = tree_.orientedGroup(tree_.boxes().leafCount + index);
+        if (met.bits != 0 && oriented) {
+            const glm::vec3 direction = oriented->along(ray_.direction);
+            const RaySlabs slabs(oriented->along(ray_.origin), direction, slack_);
+            met.intersect(slabs.met(oriented->lower, oriented->upper, nearest_));
+            met.bits &= facing(*oriented, direction);
+        }
+        stack.pushChildren(met.bits, met.enters, group.firstChild);
+    }
+
+    // Returns a bit for each child that may have a triangle through which the ray exits.
+    static unsigned facing(const OrientedGroup& group, const glm::vec3& direction) {
+        const Tag tag;
+        unsigned bits = 0;
+        for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(tag)) {
+            const auto load = [&](const std::int8_t* from) {
+                const auto bytes = hn::LoadU(hn::Rebind<std::int8_t, Tag>(), from + lane);
+                return hn::ConvertTo(tag, hn::PromoteTo(hn::Rebind<std::int32_t, Tag>(), bytes));
+            };
+            Vec highest = hn::Zero(tag);
+            for (int k = 0; k < 3; ++k) {
+                const std::int8_t* from = direction[k] > 0 ? group.upperNormal[k] : group.lowerNormal[k];
+                highest = hn::Add(highest, hn::Mul(load(from), hn::Set(tag, direction[k])));
+            }
+            bits |= bitsOf(hn::Gt(highest, hn::Set(tag, (minFacing - roundingOfFacing) * OrientedGroup::normalScale)))
+                    << lane;
+        }
+        return bits;
+    }
+
     void visit(const TriangleLeaf& leaf) {
         const Tag tag;
         const PointLanes d = all(ray_.direction);
@@ -122,6 +159,7 @@ class ExitSearch {
 
     const TriangleTree& tree_;
     const Ray& ray_;
+    const float slack_;
     RaySlabs slabs_;
     float nearest_;
 };

@@ -93,6 +93,29 @@ Mesh nearlyFlat(unsigned corners, test::Random& random) {
     return weld(mesh);
 }
 
+// Slivers in all directions that share one corner. Some run through each other.
+Mesh star(unsigned triangles, float offset, test::Random& random) {
+    Mesh mesh;
+    mesh.points.push_back(glm::vec3(offset));
+    for (unsigned i = 0; i < triangles; ++i) {
+        const glm::vec3 tip = random.direction() * float(random(0.1, 1));
+        for (const glm::vec3& p : {tip, tip + random.point(0.1)}) mesh.points.push_back(offset + p);
+        mesh.triangles.emplace_back(2 * i + 1, i % 2 ? 0 : 2 * i + 2, i % 2 ? 2 * i + 2 : 0);
+    }
+    return weld(mesh);
+}
+
+// Shells in each other, close together and turned, so that some run through each other.
+Mesh shells(std::size_t count, test::Random& random) {
+    std::vector<Mesh> all;
+    for (std::size_t i = 0; i < count; ++i) {
+        all.push_back(shapes::sphere(1 + 0.002f * float(i), 1));
+        const glm::vec3 by = random.point(0.002);
+        for (glm::vec3& p : all.back().points) p = glm::vec3(p.x - 0.5f * p.y, p.y + 0.5f * p.x, p.z) + by;
+    }
+    return weld(shapes::join(all));
+}
+
 std::set<std::pair<unsigned, unsigned>> allClosePairs(const Mesh& mesh, const TriangleTree& tree) {
     std::set<std::pair<unsigned, unsigned>> close;
     std::vector<std::pair<unsigned, unsigned>> pairs;
@@ -155,8 +178,11 @@ TEST_CASE("pairs of triangles that are left out can not run through each other")
     const unsigned seed = test::seed();
     CAPTURE(seed);
     test::Random random(seed);
-    const std::vector<Mesh> meshes{soup(700, 0, random), soup(700, 1000, random), nearlyFlat(300, random),
-                                   shapes::join({nearlyFlat(200, random), soup(300, 0, random)})};
+    const std::vector<Mesh> meshes{
+        soup(700, 0, random),    soup(700, 1000, random),
+        nearlyFlat(300, random), shapes::join({nearlyFlat(200, random), soup(300, 0, random)}),
+        star(1000, 0, random),   star(1000, 100, random),
+        shells(30, random)};
     for (const Mesh& mesh : meshes) {
         CAPTURE(mesh.triangles.size());
         const TriangleTree tree(mesh);
@@ -172,6 +198,19 @@ TEST_CASE("pairs of triangles that are left out can not run through each other")
         // the quick rejection is effective
         CHECK(apart > close.size());
     }
+}
+
+TEST_CASE("few slivers that meet in one corner are paired, and few triangles of shells in each other") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    test::Random random(seed);
+    Mesh fan = star(4000, 0, random);
+    for (unsigned i = 1; i < fan.points.size(); i += 2) fan.points[i + 1] = fan.points[i] + 0.001f * random.direction();
+    CHECK(allClosePairs(fan, TriangleTree(fan)).size() < fan.triangles.size());
+    std::vector<Mesh> nest;
+    for (int i = 0; i < 200; ++i) nest.push_back(shapes::sphere(1 + 0.005f * float(i), 1));
+    const Mesh mesh = weld(shapes::join(nest));
+    CHECK(allClosePairs(mesh, TriangleTree(mesh)).size() < mesh.triangles.size());
 }
 
 TEST_CASE("next to each other in about one plane, few triangles are paired") {
@@ -201,7 +240,9 @@ TEST_CASE("walls are as thick as by brute force") {
                                    shapes::sphere(1, 3),
                                    shapes::torus(2, 0.5, 20, 10),
                                    soup(500, 0, random),
-                                   soup(500, 1000, random)};
+                                   soup(500, 1000, random),
+                                   star(500, 0, random),
+                                   shells(20, random)};
     for (std::size_t i = 0; i < meshes.size(); ++i) {
         CAPTURE(i);
         const TriangleTree tree(meshes[i]);
