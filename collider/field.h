@@ -79,9 +79,9 @@ class Field {
     /// - Any one of the features that are equally close within the tolerance is returned. At an edge or vertex itself,
     ///   to 1e-5 voxels or the rounding of the point, it is that edge or vertex.
     ///
-    /// Without the mesh, the result is the closest zero of the interpolant to 1e-3 voxels, a hundred times slower.
-    /// Where thousands of cells are equally near, as at the centre of a sphere, it is a zero that is nearest to about
-    /// the error of the interpolant. In a band narrower than sqrt(3) voxels some zeros may be missed.
+    /// Without the mesh, the result is the closest zero of the interpolant to 1e-3 voxels, a hundred times slower. A
+    /// zero nearer than maxDistance by less than 1e-4 voxels may be missed. The time is at most proportional to the
+    /// surface, as at the centre of a sphere. In a band narrower than sqrt(3) voxels some zeros may be missed.
     ///
     /// Finds nothing for a non-finite point, nor for a negative or NaN maxDistance.
     /// @param maxDistance  search radius [m]

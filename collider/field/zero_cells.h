@@ -33,6 +33,22 @@ inline CornerValues cellValues(const FieldData& field, std::int32_t entry, const
     return {v(0), v(1), v(y), v(y + 1), v(x), v(x + 1), v(x + y), v(x + y + 1)};
 }
 
+/// The corners of a coarse cell's cells that are inside: a bit for each along z.
+using InsideRows = std::array<std::array<std::uint8_t, Clearance::partSide + 1>, Clearance::partSide + 1>;
+
+inline InsideRows insideRows(const FieldData& field, std::int32_t entry, const glm::ivec3& inBlock) {
+    InsideRows rows{};
+    for (int x = 0; x <= Clearance::partSide; ++x)
+        for (int y = 0; y <= Clearance::partSide; ++y)
+            for (int z = 0; z <= Clearance::partSide; ++z) {
+                const glm::ivec3 at = inBlock + glm::ivec3(x, y, z);
+                const int index = (at.x * FieldFrame::stride + at.y) * FieldFrame::stride + at.z;
+                const float value = field.valueAt(std::size_t(entry) * FieldFrame::blockFloats + std::size_t(index));
+                rows[x][y] |= std::uint8_t(unsigned(value < 0) << z);
+            }
+    return rows;
+}
+
 /// The directory entry of the block that holds a voxel.
 inline std::int32_t entryAt(const FieldData& field, const glm::ivec3& voxel) {
     return field.directory[field.entryOf(voxel >> 3)];

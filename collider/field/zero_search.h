@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <glm/common.hpp>
@@ -17,6 +16,7 @@
 
 #include "collider/field/interpolant.h"
 #include "collider/field/zero_cells.h"
+#include "collider/field/zero_cube.h"
 #include "collider/field/zero_set.h"
 
 namespace bilayer::detail {
@@ -25,76 +25,22 @@ namespace bilayer::detail {
 inline constexpr double smallestSide = 1.0 / 2048;
 static_assert(double(cellDiagonal) * smallestSide < zeroTolerance);
 
-/// The error that a search for the nearest zero allows. Where very many sub-cells are equally near, as from the centre
-/// of a sphere, it grows with the square of their count, up to the diagonal of a sub-cell. No sub-cell is divided from
-/// there on. So the time of a search is bounded by the count of cells that contain surface.
-class SearchTolerance {
-  public:
-    double value() const { return zeroTolerance + excess_; }
-    /// What has been added to zeroTolerance.
-    double excess() const { return excess_; }
-    /// Counts a sub-cell.
-    void count() {
-        const double share = double(++subCells_) / plentySubCells;
-        if (share > 1) excess_ = std::min(zeroTolerance * (share * share - 1), 0.5 * double(cellDiagonal));
-    }
-
-  private:
-    /// A search with one nearest place visits some hundreds.
-    static constexpr double plentySubCells = 8192;
-    std::size_t subCells_ = 0;
-    double excess_ = 0;
-};
-
 /// A cube of 2^level voxels in the directory.
 struct DirectoryCube {
     glm::ivec3 lower;
     int level;
 };
 
-/// A cell or a sub-cell.
-struct ZeroCube {
-    glm::dvec3 lower;
-    double side;
-    CornerValues values;
-
-    bool holdsZero() const {
-        const auto [low, high] = std::minmax_element(values.begin(), values.end());
-        return *low < 0 && *high >= 0;
-    }
-    glm::dvec3 centre() const { return lower + 0.5 * side; }
-};
-
-/// A linear approximation of the interpolant in a cube, with its max error.
-struct LinearBound {
-    glm::dvec3 through;
-    double value;  // at `through`
-    glm::dvec3 gradient;
-    double error;
-
-    explicit LinearBound(const ZeroCube& cube) : through(cube.centre()) {
-        const CornerValues& v = cube.values;
-        // Haar transform: the coefficients of the interpolant about the centre
-        std::array<double, 8> sum = v;
-        for (const std::size_t axis : {1, 2, 4})
-            for (std::size_t i = 0; i < 8; ++i)
-                if (!(i & axis)) {
-                    const double low = sum[i], high = sum[i | axis];
-                    sum[i] = 0.5 * (low + high);
-                    sum[i | axis] = 0.5 * (high - low);
-                }
-        value = sum[0];
-        gradient = 2 / cube.side * glm::dvec3(sum[4], sum[2], sum[1]);
-        error = std::abs(sum[3]) + std::abs(sum[5]) + std::abs(sum[6]) + std::abs(sum[7]);
-    }
-
-    double at(const glm::dvec3& point) const { return value + glm::dot(gradient, point - through); }
+/// A cell of a stored block.
+struct Cell {
+    glm::ivec3 voxel;
+    std::int32_t entry;
 };
 
 /// Finds the point of the zero set with the smallest key. A Query has
+///   limit()              only smaller keys matter
 ///   bound(lower, upper)  a lower bound of the keys in a box; infinite if no point counts
-///   bound(lower, upper, linear)  the same for the points where the linear function is zero within its error
-///   limit(tolerance)     only smaller keys matter, by the error that the search allows
+///   bound(cube, limit)   the same for the zeros of a cube; bounds beyond the limit need not be accurate
 ///   offer(point)         a point of the zero set
 ///   settle(bound, point) the smallest cube around a point, with a lower bound of its keys
 template <class Query>
@@ -115,9 +61,9 @@ class ZeroSearch {
     };
 
     // Visits children in ascending order of their bounds, as long as they are below the limit.
-    template <class Node>
-    void visitAll(const std::array<Child<Node>, 8>& children, std::size_t count) {
-        std::array<std::uint8_t, 8> order;
+    template <class Node, std::size_t max>
+    void visitAll(const std::array<Child<Node>, max>& children, std::size_t count) {
+        std::array<std::uint8_t, max> order;
         for (std::size_t i = 0; i < count; ++i) {
             std::size_t place = i;
             for (; place > 0 && children[order[place - 1]].bound > children[i].bound; --place)
@@ -128,12 +74,12 @@ class ZeroSearch {
             if (children[order[i]].bound < limit()) visit(children[order[i]].node);
     }
 
-    double limit() const { return query_.limit(tolerance_); }
+    double limit() const { return query_.limit(); }
 
     void visit(const DirectoryCube& cube) {
         constexpr int blockLevel = 3, partLevel = 2;
         if (cube.level == blockLevel && entryAt(field_, cube.lower) < 0) return;
-        if (cube.level == 0) return visitCell(cube.lower);
+        if (cube.level == partLevel) return visitPart(cube.lower);
         std::array<Child<DirectoryCube>, 8> children;
         std::size_t count = 0;
         const int level = cube.level - 1, side = 1 << level;
@@ -141,7 +87,7 @@ class ZeroSearch {
             const glm::ivec3 lower = cube.lower + side * glm::ivec3(i >> 2, i >> 1 & 1, i & 1);
             if (lower.x >= extent_.x || lower.y >= extent_.y || lower.z >= extent_.z) continue;
             const glm::dvec3 low(lower), high(glm::min(lower + side, extent_));
-            if (level >= partLevel && isClear(low, high)) continue;
+            if (isClear(low, high)) continue;
             const double bound = query_.bound(low, high);
             if (bound < limit()) children[count++] = {bound, {lower, level}};
         }
@@ -152,13 +98,34 @@ class ZeroSearch {
         return clearanceAt(field_, 0.5 * (lower + upper)) > 0.5 * glm::distance(lower, upper);
     }
 
-    void visitCell(const glm::ivec3& voxel) {
-        const ZeroCube cell{glm::dvec3(voxel), 1, cellValues(field_, entryAt(field_, voxel), voxel & 7)};
-        if (cell.holdsZero()) visit(cell);
+    // Visits the cells of a coarse cell that contain surface.
+    void visitPart(const glm::ivec3& part) {
+        constexpr int side = Clearance::partSide;
+        const std::int32_t entry = entryAt(field_, part);
+        const auto rows = insideRows(field_, entry, part & 7);
+        std::array<Child<Cell>, side * side * side> children;
+        std::size_t count = 0;
+        for (int x = 0; x < side; ++x)
+            for (int y = 0; y < side; ++y) {
+                const unsigned some = rows[x][y] | rows[x][y + 1] | rows[x + 1][y] | rows[x + 1][y + 1];
+                const unsigned all = rows[x][y] & rows[x][y + 1] & rows[x + 1][y] & rows[x + 1][y + 1];
+                const unsigned mixed = (some | some >> 1) & ~(all & all >> 1);
+                for (int z = 0; z < side; ++z) {
+                    if (!(mixed >> z & 1)) continue;
+                    const glm::ivec3 voxel = part + glm::ivec3(x, y, z);
+                    const double bound = query_.bound(glm::dvec3(voxel), glm::dvec3(voxel + 1));
+                    if (bound < limit()) children[count++] = {bound, {voxel, entry}};
+                }
+            }
+        visitAll(children, count);
+    }
+
+    void visit(const Cell& cell) {
+        visit(ZeroCube{glm::dvec3(cell.voxel), 1, cellValues(field_, cell.entry, cell.voxel & 7)});
     }
 
     void visit(const ZeroCube& cube) {
-        const double bound = query_.bound(cube.lower, cube.lower + cube.side, LinearBound(cube));
+        const double bound = query_.bound(CubeExpansion(cube), limit());
         if (!(bound < limit())) return;
         const glm::dvec3 point = offerEdges(cube);
         if (cube.side <= smallestSide) return query_.settle(bound, point);
@@ -205,8 +172,7 @@ class ZeroSearch {
             for (std::size_t c = 0; c < 8; ++c)
                 octant.values[c] = grid[first + 9 * (c >> 2) + 3 * (c >> 1 & 1) + (c & 1)];
             if (!octant.holdsZero()) continue;
-            tolerance_.count();
-            children[count].bound = query_.bound(octant.lower, octant.lower + octant.side);
+            children[count].bound = query_.bound(octant.lower, octant.upper());
             if (children[count].bound < limit()) ++count;
         }
         visitAll(children, count);
@@ -215,7 +181,6 @@ class ZeroSearch {
     const FieldData& field_;
     Query& query_;
     glm::ivec3 extent_;
-    SearchTolerance tolerance_;
 };
 
 }  // namespace bilayer::detail

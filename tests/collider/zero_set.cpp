@@ -6,8 +6,11 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include <bilayer/collider/field.h>
+#include "collider/field/zero_queries.h"
 #include "collider/field/zero_search.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/analytic.h"
@@ -25,23 +28,51 @@ constexpr double h = 0.02;  // of most fields here [m]
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float notANumber = std::numeric_limits<float>::quiet_NaN();
 
-// The distance of the nearest zero, with a count of the bounds that its search computes.
-struct CountedNearest {
-    glm::dvec3 point;
-    double best = std::numeric_limits<double>::infinity();
-    std::size_t* bounds;
+// A hollow ball: the cavity's radius and the thickness of its wall [voxels].
+Solid hollowBall(double radius, double wall, const glm::dvec3& centre) {
+    return {[=](const glm::dvec3& p) {
+                const double away = glm::distance(p, centre) / h;
+                return h * std::max(away - radius - wall, radius - away);
+            },
+            glm::dvec3(h * (radius + wall)), centre};
+}
 
-    double limit(const SearchTolerance& tolerance) const { return best - tolerance.value(); }
-    double bound(const glm::dvec3& lower, const glm::dvec3& upper) const {
-        ++*bounds;
-        return glm::distance(point, glm::clamp(point, lower, upper));
+// Points of the surface around a place, by rays [m].
+std::vector<glm::dvec3> surfaceAround(const Field& field, const glm::vec3& from, int count, Random& random) {
+    std::vector<glm::dvec3> points;
+    for (int i = 0; i < count; ++i) {
+        const glm::vec3 along = random.direction();
+        const auto hit = field.raycast({from, along});
+        REQUIRE(hit);
+        points.push_back(glm::dvec3(from) + double(hit->distance) * glm::normalize(glm::dvec3(along)));
     }
-    double bound(const glm::dvec3& lower, const glm::dvec3& upper, const LinearBound& linear) const {
-        const double slab = (std::abs(linear.at(point)) - linear.error) / glm::length(linear.gradient);
-        return std::max(bound(lower, upper), slab);
+    return points;
+}
+
+// How far a sphere goes before it touches one of the points.
+double firstTouch(const Ray& ray, double radius, std::span<const glm::dvec3> points) {
+    const glm::dvec3 from(ray.origin), direction = glm::normalize(glm::dvec3(ray.direction));
+    double first = std::numeric_limits<double>::infinity();
+    for (const glm::dvec3& point : points) {
+        const double along = glm::dot(point - from, direction);
+        const double half2 = radius * radius - glm::dot(point - from, point - from) + along * along;
+        if (half2 >= 0 && along > 0) first = std::min(first, along - std::sqrt(half2));
     }
-    void offer(const glm::dvec3& zero) { best = std::min(best, glm::distance(point, zero)); }
-    void settle(double key, const glm::dvec3&) { best = std::min(best, key); }
+    return first;
+}
+
+// A query with a count of the bounds that its search computes.
+template <class Query>
+struct Counted : Query {
+    mutable std::size_t bounds = 0;
+
+    using Query::Query;
+
+    template <class... Arguments>
+    double bound(const Arguments&... arguments) const {
+        ++bounds;
+        return Query::bound(arguments...);
+    }
 };
 
 }  // namespace
@@ -57,18 +88,57 @@ TEST_CASE("the nearest zero is found in time where all of the surface is equally
         const double cells = 1.5 * 4 * 3.14159 * voxels * voxels;  // that contain surface
         for (const double off : {0., 1e-5, 1e-3, 0.03, 1., 0.9 * voxels}) {
             const glm::vec3 point(centre + off * h * glm::dvec3(random.direction()));
-            std::size_t bounds = 0;
-            CountedNearest nearest{.point = field.data().toLocal(point), .bounds = &bounds};
+            Counted<NearestQuery> nearest(field.data().toLocal(point), std::numeric_limits<double>::infinity());
             ZeroSearch(field.data(), nearest).run();
             const double truth = voxels - glm::distance(glm::dvec3(point), centre) / h;
-            CAPTURE(voxels, off, bounds, cells);
-            CHECK(double(bounds) < 10 * cells + 2e5);
+            CAPTURE(voxels, off, nearest.bounds, cells);
+            CHECK(double(nearest.bounds) < 10 * cells + 2e5);
             // the interpolant of a convex surface lies on one side of it, by 3/8 of its curvature at most
             CHECK(nearest.best == Approx(truth).margin(0.02 + 0.4 / voxels));
             const ClosestPoint closest = field.closest(point);
             REQUIRE(closest.found);
             CHECK(double(closest.distance) / h == Approx(-truth).margin(0.02 + 0.4 / voxels));
             CHECK(std::abs(field.distance(closest.position)) < 2e-3 * h);
+        }
+    }
+}
+
+TEST_CASE("spheres that fit their cavity are cast and tested in time") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const double voxels : {16., 40., 100.}) {  // the cavity's radius
+        const glm::vec3 centre(float(h) * random.point(1));
+        const Field field(levelSetOf(hollowBall(voxels, 5, glm::dvec3(centre)), h), options);
+        const double cells = 1.5 * 4 * 3.14159 * voxels * voxels;  // that contain the cavity's surface
+        const std::vector<glm::dvec3> points = surfaceAround(field, centre, 20000, random);
+        double nearest = voxels;
+        for (const glm::dvec3& point : points)
+            nearest = std::min(nearest, glm::distance(point, glm::dvec3(centre)) / h);
+        for (const double room : {1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.1, 1e-3 * voxels}) {
+            const double reach = nearest - room;
+            const auto radius = float(reach * h);
+            const Ray ray{centre, random.direction()};
+            const glm::dvec3 from = field.data().toLocal(centre), along = glm::normalize(glm::dvec3(ray.direction));
+            Counted<AnyNearQuery> any(from, reach);
+            ZeroSearch(field.data(), any).run();
+            Counted<NearestQuery> within(from, reach);
+            ZeroSearch(field.data(), within).run();
+            Counted<SphereCastQuery> cast({from, along, 1e6}, reach);
+            ZeroSearch(field.data(), cast).run();
+            CAPTURE(voxels, room, cells, any.bounds, within.bounds, cast.bounds);
+            for (const std::size_t bounds : {any.bounds, within.bounds, cast.bounds})
+                CHECK(double(bounds) < 10 * cells + 2e5);
+            // the nearest of so many points is this much farther away than the nearest zero at most
+            constexpr double spacing = 2e-3, tolerance = 1.1e-3;
+            CHECK(field.overlapsSphere(centre, float((nearest + tolerance) * h)));
+            if (room > spacing + tolerance) CHECK_FALSE(field.overlapsSphere(centre, radius));
+            const auto hit = field.sphereCast(ray, radius);
+            REQUIRE(hit);
+            const double truth = firstTouch(ray, double(radius), points) / h;
+            CHECK(double(hit->distance) / h < truth + tolerance);
+            CHECK(double(hit->distance) / h > truth - spacing - tolerance);
         }
     }
 }
