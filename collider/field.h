@@ -70,7 +70,8 @@ class Field {
     /// With the mesh:
     /// - The result is exact to 1e-5 voxels up to ten voxels away, and to a millionth of the distance beyond.
     /// - The sign is the field's wherever that is certain: farther than a voxel's diagonal from the surface, and mostly
-    ///   nearer. inside() and the sign of sample() agree with it there.
+    ///   nearer. inside() and the sign of sample() agree with it there; but for sample() in a hole wider than a voxel,
+    ///   where the side changes between two voxels without a surface.
     /// - Elsewhere, in a closed mesh signed by normals or winding numbers, it is that of the mesh's winding number. In
     ///   one signed by normals, the normal at the closest feature decides where the sample agrees with it, and within a
     ///   tenth of a voxel of the surface. That errs only where the surface meets itself within a voxel.

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "sdf/base/jacobi_rotation.h"
 #include "collider/field/moments.h"
+#include "sdf/base/jacobi_rotation.h"
 #include "sdf/mesh/unite.h"
 
 namespace bilayer {

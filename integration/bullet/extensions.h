@@ -61,7 +61,7 @@ struct ExtensionOptions {
     /// - The kinetic energy of a body changes by a fifth in a step at most.
     /// - Contacts, normals and positions of the step stay as they are.
     ///
-    /// Not handled are fields, planes and boxes as ground, ground that moves, triangle meshes within compounds, and
+    /// Not handled are fields, planes and boxes as ground, compounds that hold one of these, ground that moves, and
     /// bodies without a field.
     bool smoothGround = true;
 

@@ -33,13 +33,6 @@ glm::dvec3 crossing(const glm::dvec3& a, double atA, const glm::dvec3& b, double
     return a + atA / (atA - atB) * (b - a);
 }
 
-double distance(const Segment& segment, const glm::dvec3& p) {
-    const glm::dvec3 along = segment.to - segment.from;
-    const double squared = glm::dot(along, along);
-    const double at = squared > 0 ? std::clamp(glm::dot(p - segment.from, along) / squared, 0.0, 1.0) : 0;
-    return glm::distance(p, segment.from + at * along);
-}
-
 /// Items on the two sides of a line: 0 where heights are negative, 1 where they are positive.
 template <class Item>
 using Halves = std::array<Item, 2>;
@@ -116,9 +109,13 @@ class Cutter {
 
   private:
     Pieces divide(Polygon polygon, std::vector<Cut> cuts) const {
-        dropAlongBorder(polygon, cuts);
-        while (!cuts.empty()) {
-            Split halves = splitAcross(polygon, cuts);
+        // a line across all of them is tried again once many of them have gone
+        for (std::size_t tryAgainAt = cuts.size(); !cuts.empty();) {
+            Split halves;
+            if (cuts.size() > fewSegments && cuts.size() <= tryAgainAt) {
+                halves = splitBy(middle(cuts), polygon, cuts);
+                tryAgainAt = std::size_t(usefulPart * double(cuts.size()));
+            }
             if (!isUseful(halves, cuts.size())) {
                 const CuttingLine line = cuts.back().line;
                 cuts.pop_back();
@@ -132,16 +129,6 @@ class Cutter {
         return labelled(std::move(polygon));
     }
 
-    /// Drops the segments within the slack of an edge of the polygon: what they cut off is too thin for a piece.
-    void dropAlongBorder(const Polygon& polygon, std::vector<Cut>& cuts) const {
-        for (std::size_t i = 0; i < polygon.size(); ++i) {
-            const Segment edge{polygon[i], polygon[(i + 1) % polygon.size()]};
-            std::erase_if(cuts, [&](const Cut& cut) {
-                return distance(edge, cut.segment.from) <= slack_ && distance(edge, cut.segment.to) <= slack_;
-            });
-        }
-    }
-
     struct Split {
         Halves<Polygon> polygons;
         Halves<std::vector<Cut>> cuts;
@@ -149,13 +136,11 @@ class Cutter {
     };
 
     Split splitBy(const CuttingLine& line, const Polygon& polygon, const std::vector<Cut>& cuts) const {
-        Split halves{split(polygon, line), split(cuts, line, slack_), false};
-        halves.thin = isThin(halves.polygons[0], line, slack_) || isThin(halves.polygons[1], line, slack_);
+        Split halves{split(polygon, line), {}};
+        if (isThin(halves.polygons[0], line, slack_) || isThin(halves.polygons[1], line, slack_)) return halves;
+        halves.cuts = split(cuts, line, slack_);
+        halves.thin = false;
         return halves;
-    }
-
-    Split splitAcross(const Polygon& polygon, const std::vector<Cut>& cuts) const {
-        return cuts.size() > fewSegments ? splitBy(middle(cuts), polygon, cuts) : Split{};
     }
 
     static bool isUseful(const Split& halves, std::size_t segments) {

@@ -90,6 +90,34 @@ TEST_CASE("Bodies keep their energy over waves of triangles of any size, at any 
     CHECK(sum < 0.1 * sumWithout);
 }
 
+TEST_CASE("Ground in a compound, and kinematic ground that does not move, are smooth, too") {
+    Shape block(exactBox({0.3f, 0.3f, 0.15f}, voxel));
+    const demo::Waves waves({0.1f, 0.25f});
+    const auto ground = waves.shape();
+    btCompoundShape inner, outer;
+    const btTransform turned(btQuaternion({0, 0, 1}, SIMD_HALF_PI), {1, 2, 3});
+    inner.addChildShape(turned, ground.get());
+    outer.addChildShape(turned.inverse(), &inner);
+    const auto lossOn = [&](btCollisionShape& shape, bool isKinematic, bool smoothGround) {
+        Slider slider(shape, block, {-5, 0.2f, 0.15f + waves.highestAround(-5, 0.2f, 0.45f)}, {2, 0, 0});
+        btCollisionObject* const mesh = slider.world.dynamics.getCollisionObjectArray()[0];
+        if (isKinematic) {
+            mesh->setCollisionFlags(mesh->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+            mesh->setActivationState(DISABLE_DEACTIVATION);
+        }
+        const WorldExtensions extensions(slider.world.dynamics, {.smoothGround = smoothGround});
+        slider.run(0.5f, 240);
+        const double start = slider.energy(), kinetic = kineticEnergyOf(*slider.body);
+        slider.run(2, 240);
+        return (start - slider.energy()) / kinetic;
+    };
+    for (const bool isKinematic : {false, true}) {
+        btCollisionShape& shape = isKinematic ? *ground : static_cast<btCollisionShape&>(outer);
+        CHECK(std::abs(lossOn(shape, isKinematic, true)) < 0.04);  // 2 % of the speed
+        CHECK(lossOn(shape, isKinematic, false) > 0.1);
+    }
+}
+
 TEST_CASE("A ball that rolls over flat triangles keeps its energy") {
     const unsigned seed = test::seed();
     Random random(seed);

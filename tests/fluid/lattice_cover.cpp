@@ -2,7 +2,11 @@
 // Thin plates at any position of the voxels, and the voxels that are recommended for them.
 #include "integration/fluid/detail/lattice_cover.h"
 
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -88,4 +92,43 @@ TEST_CASE("a ball of the covering width holds a voxel wherever the lattice falls
     };
     CHECK(covers(1.005 * fluid::detail::coveringWidth));
     CHECK_FALSE(covers(1.73));
+}
+
+TEST_CASE("rotated plates of any size cover the lattices that brute force finds covered") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> any(0, 1);
+    int complete = 0, tried = 0;
+    for (; tried < 60; ++tried) {
+        const double side = tried % 3 == 0 ? 20 : 3;  // [voxels]; large ones have too many places for one by one
+        const glm::vec3 half(side * (0.5 + any(random)), side * (0.5 + any(random)), 0.15 + 0.6 * any(random));
+        const glm::quat rotation =
+            glm::angleAxis(float(any(random)), glm::normalize(glm::vec3(any(random), 1, any(random))));
+        const Mesh plate = transformed(shapes::box(half), glm::mat4_cast(rotation));
+        const Bounds box = bounds(plate);
+        const auto depth = [&](const glm::dvec3& p) {
+            const glm::dvec3 within = glm::dvec3(half) - glm::abs(glm::inverse(glm::dquat(rotation)) * p);
+            return std::min({within.x, within.y, within.z});
+        };
+        // the voxels of all 64 lattices
+        const double needed = std::sqrt(3.0) / 8;
+        std::array<double, 64> deepest;
+        deepest.fill(-1);
+        const glm::ivec3 count(4.f * (box.upper - box.lower) + 1.f);
+        for (int x = 0; x < count.x; ++x)
+            for (int y = 0; y < count.y; ++y)
+                for (int z = 0; z < count.z; ++z) {
+                    double& depthThere = deepest[std::size_t(x % 4 * 16 + y % 4 * 4 + z % 4)];
+                    depthThere = std::max(depthThere, depth(glm::dvec3(box.lower) + (glm::dvec3(x, y, z) + 0.5) / 4.0));
+                }
+        const double shallowest = *std::min_element(deepest.begin(), deepest.end());
+        CAPTURE(tried, half.x, half.y, half.z, shallowest);
+        if (std::abs(shallowest - needed) < 1e-4) continue;
+        const bool isComplete = fluid::detail::LatticeCover(plate, nullptr).isComplete();
+        CHECK(isComplete == (shallowest > needed));
+        complete += isComplete;
+    }
+    CHECK(complete > 5);
+    CHECK(complete < tried - 5);
 }

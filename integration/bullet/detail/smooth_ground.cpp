@@ -36,21 +36,42 @@ constexpr float minSlope = 1e-3f;
 constexpr float maxChange = 0.2f;
 
 bool isTriangles(const btCollisionShape& shape) {
+    if (shape.isCompound()) {
+        const auto& compound = static_cast<const btCompoundShape&>(shape);
+        for (int i = 0; i < compound.getNumChildShapes(); ++i)
+            if (!isTriangles(*compound.getChildShape(i))) return false;
+        return true;
+    }
     const int type = shape.getShapeType();
     return shape.isConcave() && type != FAST_CONCAVE_MESH_PROXYTYPE && type != STATIC_PLANE_PROXYTYPE;
 }
 
-/// The ground's triangles in the bounding box of a body, in the ground's coordinates.
-std::vector<Triangle> trianglesUnder(const btRigidBody& body, const btCollisionObject& ground) {
+/// Whether an object consists of triangles and does not move, even if it is kinematic.
+bool isGround(const btCollisionObject& object) {
+    if (!object.isStaticOrKinematicObject() || !isTriangles(*object.getCollisionShape())) return false;
+    const Velocity velocity = velocityOf(object);
+    return velocity.linear.isZero() && velocity.angular.isZero();
+}
+
+/// The maximum turn of the smooth edges in the bounding box of a body [rad].
+/// @param at  pose of the shape with the edges
+float turnUnder(const btRigidBody& body, const btCollisionShape& shape, const btTransform& at) {
+    if (shape.isCompound()) {
+        const auto& compound = static_cast<const btCompoundShape&>(shape);
+        float turn = 0;
+        for (int i = 0; i < compound.getNumChildShapes(); ++i)
+            turn = std::max(turn, turnUnder(body, *compound.getChildShape(i), at * compound.getChildTransform(i)));
+        return turn;
+    }
     btVector3 lower, upper;
-    body.getCollisionShape()->getAabb(ground.getWorldTransform().inverse() * body.getWorldTransform(), lower, upper);
+    body.getCollisionShape()->getAabb(at.inverse() * body.getWorldTransform(), lower, upper);
     std::vector<Triangle> triangles;
     const auto add = [&](const Triangle& triangle, std::uint64_t) {
         const btVector3 corners[] = {toBullet(triangle[0]), toBullet(triangle[1]), toBullet(triangle[2])};
         if (TestTriangleAgainstAabb2(corners, lower, upper)) triangles.push_back(triangle);
     };
-    sheetOf(static_cast<const btConcaveShape&>(*ground.getCollisionShape())).visit({toGlm(lower), toGlm(upper)}, add);
-    return triangles;
+    sheetOf(static_cast<const btConcaveShape&>(shape)).visit({toGlm(lower), toGlm(upper)}, add);
+    return maxSmoothTurn(triangles);
 }
 
 /// The turn of a body's own surface at a place, in the axes of its shape [rad].
@@ -94,7 +115,8 @@ const Velocity* SmoothGround::velocityBefore(const btCollisionObject& object) co
 
 float SmoothGround::turnUnder(const Ground& ground) {
     const auto [turn, isNew] = turns_.try_emplace(ground, 0.f);
-    if (isNew) turn->second = maxSmoothTurn(trianglesUnder(*ground.first, *ground.second));
+    const auto& [body, object] = ground;
+    if (isNew) turn->second = detail::turnUnder(*body, *object->getCollisionShape(), object->getWorldTransform());
     return turn->second;
 }
 
@@ -129,9 +151,9 @@ void SmoothGround::afterStep(float seconds) {
     for (int m = 0; m < world_.getDispatcher()->getNumManifolds(); ++m) {
         const btPersistentManifold& manifold = *world_.getDispatcher()->getManifoldByIndexInternal(m);
         const btCollisionObject *object = manifold.getBody0(), *ground = manifold.getBody1();
-        if (object->isStaticObject()) std::swap(object, ground);
+        if (object->isStaticOrKinematicObject()) std::swap(object, ground);
         btRigidBody* const body = activeDynamicBody(const_cast<btCollisionObject&>(*object));
-        if (!body || !standsStill(*ground) || !isTriangles(*ground->getCollisionShape())) continue;
+        if (!body || !isGround(*ground)) continue;
         if (holdsField(*body->getCollisionShape())) losses[body] += lossIn(manifold, {body, ground}, seconds);
     }
     for (const auto& [body, loss] : losses) {

@@ -35,12 +35,9 @@ Velocity velocityOf(const btMultiBodyLinkCollider& collider) {
 
 }  // namespace
 
-bool standsStill(const btCollisionObject& object) {
-    return object.isStaticObject() && !object.isKinematicObject();
-}
-
 Velocity velocityOf(const btCollisionObject& object) {
-    if (standsStill(object)) return {};
+    // Bullet also calls a kinematic body without mass static.
+    if (object.isStaticObject() && !object.isKinematicObject()) return {};
     if (const btRigidBody* body = btRigidBody::upcast(&object))
         return {body->getCenterOfMassPosition(), body->getLinearVelocity(), body->getAngularVelocity()};
     if (const auto* link = btMultiBodyLinkCollider::upcast(&object); link && link->m_multiBody)

@@ -17,10 +17,7 @@ struct Velocity {
     btVector3 at(const btVector3& point) const { return linear + angular.cross(point - centre); }
 };
 
-/// Whether an object is static and is not moved by its poses: Bullet also calls a kinematic body without mass static.
-bool standsStill(const btCollisionObject& object);
-
-/// The current velocity of an object. Zero for objects that stand still and objects that are not bodies. Kinematic
+/// The current velocity of an object. Zero for static objects and objects that are not bodies. Kinematic
 /// bodies move as given by their poses of the last steps.
 Velocity velocityOf(const btCollisionObject& object);
 

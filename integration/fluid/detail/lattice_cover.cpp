@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Branch and bound. Space is divided into cubes, the deepest ones first. No point of a cube is deeper in the body than
-// the cube's centre by more than half a diagonal, so cubes without a deep point are discarded.
+// the cube's centre by more than half a diagonal, so cubes without a deep point are discarded. Bodies that are wide
+// enough somewhere are found so. Where all of a body is about as thin, a field decides on all cubes at once.
 #include "integration/fluid/detail/lattice_cover.h"
 
 #include <tbb/parallel_for.h>
@@ -11,9 +12,13 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <optional>
 #include <queue>
 #include <vector>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/bvh/winding_number.h"
@@ -27,8 +32,8 @@ namespace {
 
 /// Lattices along an axis. The cubes of the smallest side are centred at their voxels.
 constexpr int lattices = 4;
-/// Count of cubes that are divided at once.
-constexpr std::size_t batchSize = 64;
+/// Count of cubes that are divided at once, and of those after which the search gives up.
+constexpr std::size_t batchSize = 64, maxCubes = 4096;
 /// Count of triangles from which a climb starts, and the first and last depth behind them [voxels].
 constexpr std::size_t climbs = 64;
 constexpr double firstDepth = 1e-2, lastDepth = 1e-5;
@@ -68,15 +73,25 @@ struct Cube {
     bool operator<(const Cube& other) const { return maxDepth() < other.maxDepth(); }
 };
 
+using Covered = std::bitset<lattices * lattices * lattices>;
+
+/// The lattice with a voxel at the centre of a cube of the smallest side.
+std::size_t latticeOfCube(const glm::ivec3& cube) {
+    const glm::ivec3 in = cube & (lattices - 1);
+    return (std::size_t(in.x) * lattices + std::size_t(in.y)) * lattices + std::size_t(in.z);
+}
+
 class CoverSearch {
   public:
     CoverSearch(const Mesh& mesh, Progress* progress)
         : progress_(progress), depth_(mesh, progress), box_(bounds(mesh)), origin_(box_.lower) {}
 
-    bool run() {
+    /// Whether all lattices are covered. Nothing if that is not decided soon.
+    std::optional<bool> run() {
         std::priority_queue<Cube> cubes;
         cubes.push(whole());
-        while (!cubes.empty() && !covered_.all()) {
+        for (std::size_t count = 0; !cubes.empty() && !covered_.all(); count += batchSize) {
+            if (count >= maxCubes) return std::nullopt;
             std::vector<Cube> batch;
             for (; batch.size() < batchSize && !cubes.empty(); cubes.pop())
                 if (isNeeded(cubes.top())) batch.push_back(cubes.top());
@@ -103,10 +118,7 @@ class CoverSearch {
         return origin_ + (lower + 0.5 * side) / double(lattices);
     }
 
-    static std::size_t latticeOf(const glm::dvec3& lower) {
-        const glm::dvec3 in = lower - double(lattices) * glm::floor(lower / double(lattices));
-        return (std::size_t(in.x) * lattices + std::size_t(in.y)) * lattices + std::size_t(in.z);
-    }
+    static std::size_t latticeOf(const glm::dvec3& lower) { return latticeOfCube(glm::ivec3(lower)); }
 
     /// Whether a cube may hold voxels of a lattice that has none inside yet.
     bool isNeeded(const Cube& cube) const {
@@ -140,8 +152,33 @@ class CoverSearch {
     const Depth depth_;
     const Bounds box_;
     const glm::dvec3 origin_;
-    std::bitset<lattices * lattices * lattices> covered_;  // lattices with a voxel inside
+    Covered covered_;  // lattices with a voxel inside
 };
+
+// The depths of all cubes of the smallest side at once: those of a field whose voxels are these cubes.
+bool isCoveredInField(const Mesh& mesh, Progress* progress) {
+    Mesh inCubes{{}, mesh.triangles, {}};
+    const glm::dvec3 origin(bounds(mesh).lower);
+    for (const glm::vec3& p : mesh.points)
+        inCubes.points.emplace_back(double(lattices) * (glm::dvec3(p) - origin) - 0.5);
+    const auto goesOn = [&](float) {
+        poll(progress);
+        return true;
+    };
+    const LevelSet field = build(inCubes, {.voxelSize = 1,
+                                           .exteriorWidthVoxels = 1,
+                                           .interiorWidthVoxels = 1,
+                                           .sign = Sign::winding,
+                                           .progress = goesOn});
+    Covered covered;
+    for (auto value = field.grids().distance->tree().cbeginValueAll(); value; ++value) {
+        if (!(-double(*value) >= lattices * minDepth)) continue;
+        const openvdb::Coord cube = value.getCoord();
+        covered.set(latticeOfCube({cube.x(), cube.y(), cube.z()}));
+        if (!value.isVoxelValue()) return true;  // a tile has cubes of all lattices
+    }
+    return covered.all();
+}
 
 // Moves to deeper places as long as there are any next to it. Steps are shorter than the depth, so all places are
 // inside.
@@ -176,7 +213,8 @@ WidePlace climb(const Mesh& mesh, const Depth& depth, const glm::uvec3& triangle
 }  // namespace
 
 bool LatticeCover::isComplete() const {
-    return CoverSearch(mesh_, progress_).run();
+    const std::optional<bool> found = CoverSearch(mesh_, progress_).run();
+    return found ? *found : isCoveredInField(mesh_, progress_);
 }
 
 WidePlace LatticeCover::widestPlace() const {
