@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include <bit>
+#include <optional>
 
 #include "sdf/bvh/rotated_boxes.h"
 #include "sdf/bvh/tree_lanes.h"
@@ -172,6 +173,21 @@ struct Others {
     }
 };
 
+// A leaf along the axes of its group.
+struct OrientedLeaf {
+    const OrientedGroup& group;
+    ChildBox box, edges;              // all of the leaf, and the edges opposite to the common vertex
+    std::uint32_t vertex = noVertex;  // that all triangles of the leaf share
+
+    OrientedLeaf(const TriangleTree& tree, const OrientedGroup& group, std::size_t place)
+        : group(group), box(group.lower, group.upper, place), edges(box) {
+        if (const FanGroup* fans = tree.fanGroup(group)) {
+            vertex = fans->vertex[place];
+            edges = ChildBox(fans->lower, fans->upper, place);
+        }
+    }
+};
+
 class LeafPairs {
   public:
     LeafPairs(const Mesh& mesh, const TriangleTree& tree, std::uint32_t leaf,
@@ -180,15 +196,10 @@ class LeafPairs {
           tree_(tree),
           index_(leaf),
           leaf_(tree.leaf(leaf)),
-          own_(*tree.orientedGroup(tree.boxes().leafCount + leaf / treeWidth)),
-          box_(own_.lower, own_.upper, leaf % treeWidth),
-          edges_(box_),
           room_(roundingOfPlaces * tree.largestCoordinate()),
           pairs_(pairs) {
-        if (const FanGroup* fans = tree.fanGroup(own_)) {
-            vertex_ = fans->vertex[leaf % treeWidth];
-            edges_ = ChildBox(fans->lower, fans->upper, leaf % treeWidth);
-        }
+        if (const OrientedGroup* group = tree.orientedGroup(tree.boxes().leafCount + leaf / treeWidth))
+            oriented_.emplace(tree, *group, leaf % treeWidth);
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
             const BoxLanes boxes = Lanes(leaf_, lane).boxes;
             store(boxes.lower, lower_, lane);
@@ -211,8 +222,8 @@ class LeafPairs {
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
             const BoxLanes boxes(loadLanes(Tag(), group.lower, lane), loadLanes(Tag(), group.upper, lane));
             unsigned bits = bitsOf(hn::AndNot(boxes.share(own), boxes.meet(own)));
-            if (bits != 0)
-                if (const OrientedGroup* oriented = tree_.orientedGroup(node)) bits &= inOriented(*oriented, lane);
+            if (bits != 0 && oriented_)
+                if (const OrientedGroup* other = tree_.orientedGroup(node)) bits &= inOriented(*other, lane);
             for (; bits != 0; bits &= bits - 1) {
                 const std::size_t place = lane + std::size_t(std::countr_zero(bits));
                 const std::uint32_t child = group.firstChild + std::uint32_t(place);
@@ -232,25 +243,28 @@ class LeafPairs {
 
     // Returns a bit for each child of a group, from a lane on, whose triangles may meet those of the leaf.
     unsigned inOriented(const OrientedGroup& group, std::size_t lane) const {
-        const Rotation rotation(own_, group, room_);
-        const unsigned bits = reached(group, lane) & rotation.met(box_, group.lower, group.upper, lane);
+        const Rotation rotation(oriented_->group, group, room_);
+        const unsigned bits = reached(group, lane) & rotation.met(oriented_->box, group.lower, group.upper, lane);
         const FanGroup* fans = tree_.fanGroup(group);
-        if (bits == 0 || vertex_ == noVertex || !fans) return bits;
+        if (bits == 0 || oriented_->vertex == noVertex || !fans) return bits;
         unsigned sameFan = 0;
-        for (std::size_t i = 0; lane + i < treeWidth; ++i) sameFan |= unsigned(fans->vertex[lane + i] == vertex_) << i;
-        return bits & (~sameFan | rotation.met(edges_, group.lower, group.upper, lane) |
-                       rotation.met(box_, fans->lower, fans->upper, lane));
+        for (std::size_t i = 0; lane + i < treeWidth; ++i)
+            sameFan |= unsigned(fans->vertex[lane + i] == oriented_->vertex) << i;
+        return bits & (~sameFan | rotation.met(oriented_->edges, group.lower, group.upper, lane) |
+                       rotation.met(oriented_->box, fans->lower, fans->upper, lane));
     }
 
     // Returns the lanes whose triangles meet the leaf's box along its own axes.
     Mask alongAxes(const Lanes& lanes) const {
         const Tag tag;
         Mask meets = hn::FirstN(tag, treeWidth);
+        if (!oriented_) return meets;
+        const ChildBox& box = oriented_->box;
         for (int k = 0; k < 3; ++k) {
-            const PointLanes axis = axisLanes(own_, k);
+            const PointLanes axis = axisLanes(oriented_->group, k);
             const Vec a = dot(lanes.corners[0], axis), b = dot(lanes.corners[1], axis), c = dot(lanes.corners[2], axis);
-            meets = hn::And(meets, hn::And(hn::Le(BoxLanes::smallest(a, b, c), hn::Set(tag, box_.upper[k] + room_)),
-                                           hn::Ge(BoxLanes::largest(a, b, c), hn::Set(tag, box_.lower[k] - room_))));
+            meets = hn::And(meets, hn::And(hn::Le(BoxLanes::smallest(a, b, c), hn::Set(tag, box.upper[k] + room_)),
+                                           hn::Ge(BoxLanes::largest(a, b, c), hn::Set(tag, box.lower[k] - room_))));
         }
         return meets;
     }
@@ -326,10 +340,8 @@ class LeafPairs {
     const TriangleTree& tree_;
     const std::uint32_t index_;
     const TriangleLeaf& leaf_;
-    const OrientedGroup& own_;
-    ChildBox box_, edges_;             // along its axes: all of the leaf, and the edges opposite to the common vertex
-    const float room_;                 // margin along axes [m]
-    std::uint32_t vertex_ = noVertex;  // that all triangles of the leaf share
+    const float room_;                                             // margin along axes [m]
+    std::optional<OrientedLeaf> oriented_;                         // nothing if the tree has no oriented boxes
     alignas(64) float lower_[3][treeWidth], upper_[3][treeWidth];  // boxes of the leaf's triangles
     std::vector<std::pair<unsigned, unsigned>>& pairs_;
 };

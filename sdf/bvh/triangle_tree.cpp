@@ -27,6 +27,22 @@ TreeItem itemOf(const Mesh& mesh, unsigned triangle) {
 }
 
 // The part of a line beyond a position, and a plane perpendicular to it onto which triangles are projected.
+/// Count of leaves that tell how much the boxes overlap, and max count of the leaves that one of them meets.
+constexpr std::size_t maxSamples = 256, maxMet = 4096;
+/// A leaf of a plain surface meets about ten leaves. Where it meets more than this, oriented boxes pay.
+constexpr std::size_t crowd = 64;
+
+Bounds boxAt(const BoxGroup& group, int i) {
+    return {{group.lower[0][i], group.lower[1][i], group.lower[2][i]},
+            {group.upper[0][i], group.upper[1][i], group.upper[2][i]}};
+}
+
+bool overlaps(const Bounds& a, const Bounds& b) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (!(a.lower[axis] <= b.upper[axis] && b.lower[axis] <= a.upper[axis])) return false;
+    return true;
+}
+
 class LineSearch {
   public:
     LineSearch(const glm::dvec3& from, const glm::dvec3& along, double first, double slack)
@@ -125,6 +141,32 @@ class LineSearch {
 
 }  // namespace
 
+// Whether boxes of leaves overlap much more than those of a plain surface do, judged by a sample of them.
+bool TriangleTree::isCrowded() const {
+    std::size_t samples = 0, met = 0;
+    for (std::size_t leaf = 0; leaf < leaves_.size(); leaf += 1 + leaves_.size() / maxSamples) {
+        const BoxGroup& group = boxes_.group(std::uint32_t(leaves_.size() + leaf / treeWidth));
+        const Bounds box = boxAt(group, int(leaf % treeWidth));
+        std::vector<std::uint32_t> open{boxes_.root()};
+        std::size_t count = 0;
+        while (!open.empty() && count < maxMet) {
+            const BoxGroup& next = boxes_.group(open.back());
+            open.pop_back();
+            for (int i = 0; i < treeWidth; ++i)
+                if (overlaps(box, boxAt(next, i))) {
+                    const std::uint32_t child = next.firstChild + std::uint32_t(i);
+                    if (boxes_.isLeaf(child))
+                        ++count;
+                    else
+                        open.push_back(child);
+                }
+        }
+        met += count;
+        ++samples;
+    }
+    return met > crowd * samples;
+}
+
 TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh), count_(mesh.triangles.size()) {
     auto items = vectorOf<TreeItem>(count_, progress);
     forAllPolled(count_, grain, progress, [&](std::size_t i) { items[i] = itemOf(mesh, unsigned(i)); });
@@ -159,7 +201,7 @@ void TriangleTree::build(std::vector<TreeItem> order, Progress* progress) {
         boxes_.setLeafBox(index, box.lower, box.upper);
     });
     boxes_.joinBoxes(progress);
-    oriented_ = orientedGroups(mesh_, boxes_, leaves_, leafSize(leaves_.size() - 1), progress);
+    if (isCrowded()) oriented_ = orientedGroups(mesh_, boxes_, leaves_, leafSize(leaves_.size() - 1), progress);
     const BoxGroup& root = boxes_.group(boxes_.root());
     for (int k = 0; k < 3; ++k)
         for (int i = 0; i < treeWidth; ++i)

@@ -61,7 +61,7 @@ class TriangleTree {
     }
 
     const BoxTree& boxes() const { return boxes_; }
-    /// Returns the oriented boxes of a group, or null if it has none.
+    /// Returns the oriented boxes of a group, or null if it has none. A mesh whose leaves hardly overlap has none.
     const OrientedGroup* orientedGroup(std::uint32_t node) const {
         const std::size_t group = node - boxes_.leafCount;
         return group < oriented_.groups.size() ? &oriented_.groups[group] : nullptr;
@@ -96,13 +96,14 @@ class TriangleTree {
     }
 
     void build(std::vector<TreeItem> items, Progress* progress);
+    bool isCrowded() const;
 
     const Mesh& mesh_;
     std::size_t count_;  // of triangles
     float largest_ = 0;  // max absolute coordinate [m]
     BoxTree boxes_;
     LargeArray<TriangleLeaf> leaves_;
-    OrientedGroups oriented_;  // of the first groups
+    OrientedGroups oriented_;  // of the first groups, where the mesh is crowded
 };
 
 /// Returns directions that are evenly distributed over a hemisphere (a Fibonacci lattice). None is parallel to an axis.
