@@ -121,8 +121,10 @@ void Floats::convert(const py::array& array, Range range) {
         const std::optional<std::size_t> wrong = firstOutside(values, range);
         if (!wrong) return;
         const auto value = double(values[*wrong]);
-        throw std::invalid_argument(fmt::format("{}{} is {}, and must be {}", name_, indexText(*wrong, wholeShape()),
-                                                value, isTooLarge(value) ? "in the range of float32" : nameOf(range)));
+        const Shape shape = wholeShape();
+        throw std::invalid_argument(fmt::format("{}{} is {}, and must be {}{}", name_, indexText(*wrong, shape), value,
+                                                isTooLarge(value) ? "in the range of float32" : nameOf(range),
+                                                shape.empty() ? "" : fmt::format("; its shape is {}", text(shape))));
     };
     // numpy would warn of each double beyond the range of floats
     if (array.dtype().kind() == 'f' && array.dtype().itemsize() > py::ssize_t(sizeof(float))) {

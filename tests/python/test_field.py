@@ -68,7 +68,7 @@ def test_lists_and_broadcast_arrays(box_field):
         ("abc", "points: expected"),
         ([[1, 2], [3]], "points: expected"),
         (np.array([[1, 2, 3]], dtype=object), "dtype object"),
-        ([[0, 0, 0], [0, np.nan, 0]], r"points\[1, 1\] is nan, and must be finite"),
+        ([[0, 0, 0], [0, np.nan, 0]], r"points\[1, 1\] is nan, and must be finite; its shape is \(2, 3\)"),
         (np.full((2, 2, 3), np.inf), r"points\[0, 0, 0\] is inf"),
         (np.array([[1e300, 0, 0]]), r"points\[0, 0\] is 1e[+]300, and must be in the range of float32"),
     ],

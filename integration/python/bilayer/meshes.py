@@ -171,8 +171,9 @@ def sphere(radius: float = 1, subdivisions: int = 3) -> Mesh:
 def _subdivided(vertices: Any, faces: Any) -> Any:
     """Cuts each face into four, with the new vertices on the unit sphere."""
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, inverse = np.unique(edges, axis=0, return_inverse=True)
-    middles = vertices[unique].sum(axis=1)
+    # one number for each edge: numpy sorts pairs slowly, and keeps other threads waiting
+    unique, inverse = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_inverse=True)
+    middles = vertices[np.stack(np.divmod(unique, len(vertices)), axis=1)].sum(axis=1)
     middles /= np.linalg.norm(middles, axis=1, keepdims=True)
     a, b, c = faces.T
     ab, bc, ca = len(vertices) + inverse.reshape(-1, 3).T
