@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thin plates at any position of the voxels, and the voxels that are recommended for them.
+// Thin plates at any position of the voxels, the voxels that are recommended for them, and the lattices they cover.
 #include "integration/fluid/detail/lattice_cover.h"
 
 #include <algorithm>
