@@ -83,26 +83,31 @@ TEST_CASE("Contact reduction keeps load-bearing contacts while a body rocks on t
     std::uniform_real_distribution<float> rough(-2e-4f, 2e-4f), tilt(-1.5e-3f, 1.5e-3f), side(-1, 1);
     const float bend = GENERATE(0.f, 0.15f, 0.3f);  // tilt of normals towards the rim
     CAPTURE(bend);
-    std::vector<Contact> flat;
-    for (std::uint32_t i = 0; i < 200; ++i) {
-        const float x = side(random), y = side(random);
-        flat.push_back({{0.1f * x, 0.1f * y, 0}, glm::normalize(glm::vec3(bend * x, bend * y, 1)), rough(random), i});
-    }
-    std::vector<ContactPatch> last;
-    std::set<std::uint32_t> before;
+    // In about one of a hundred patches more contacts than a patch may hold become the deepest one in turn, which must
+    // be kept: these change places. So the bound is one for many patches.
     int gone = 0, kept = 0;
-    for (int step = 0; step < 200; ++step) {
-        std::vector<Contact> contacts = flat;
-        const float x = tilt(random), y = tilt(random);
-        for (Contact& contact : contacts) contact.distance += x * contact.position.x + y * contact.position.y;
-        last = reduce(contacts, last).patches;
-        const std::set<std::uint32_t> now = featuresOf(last);
-        REQUIRE(now.size() <= 12);
-        for (const std::uint32_t feature : before) gone += !now.contains(feature);
-        kept += int(before.size());
-        before = now;
+    for (int patch = 0; patch < 20; ++patch) {
+        std::vector<Contact> flat;
+        for (std::uint32_t i = 0; i < 200; ++i) {
+            const float x = side(random), y = side(random);
+            flat.push_back(
+                {{0.1f * x, 0.1f * y, 0}, glm::normalize(glm::vec3(bend * x, bend * y, 1)), rough(random), i});
+        }
+        std::vector<ContactPatch> last;
+        std::set<std::uint32_t> before;
+        for (int step = 0; step < 200; ++step) {
+            std::vector<Contact> contacts = flat;
+            const float x = tilt(random), y = tilt(random);
+            for (Contact& contact : contacts) contact.distance += x * contact.position.x + y * contact.position.y;
+            last = reduce(contacts, last).patches;
+            const std::set<std::uint32_t> now = featuresOf(last);
+            REQUIRE(now.size() <= 12);
+            for (const std::uint32_t feature : before) gone += !now.contains(feature);
+            kept += int(before.size());
+            before = now;
+        }
     }
-    CHECK(gone <= kept / 100);
+    CHECK(gone <= kept / 250);
 }
 
 TEST_CASE("Contact reduction keeps its selection until the bodies have moved, and updates positions") {

@@ -221,10 +221,11 @@ TEST_CASE("Overlapping bodies have the depth of the deepest point") {
     const Collider ball = colliderOf(shapes::sphere(0.5f, 5)), block = colliderOf(shapes::box(glm::vec3(0.5f)));
     for (int i = 0; i < 100; ++i) {
         CAPTURE(i);
-        // a ball on a face of the block, and the same turned together
-        const float depth = float(random(0.01, 0.4));
+        // a ball on a face of the block, and the same turned together; its deepest point is nearer to that face than
+        // to any other
+        const float depth = float(random(0.01, 0.4)), aside = 0.45f - depth;
         const Pose frame = randomPose(random, 1);
-        const glm::vec3 at(float(random(-0.2, 0.2)), float(random(-0.2, 0.2)), 1 - depth);
+        const glm::vec3 at(float(random(-aside, aside)), float(random(-aside, aside)), 1 - depth);
         const Placed a{ball, {frame.toWorld(at), frame.rotation}}, b{block, frame};
         const BodyDistance answer = distance(a, b);
         CHECK(answer.overlap == Overlap::surfaces);
