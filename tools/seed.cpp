@@ -18,6 +18,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "integration/fluid/detail/liquid_copy.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/leaf/build_options.h"
 #include "tools/commands.h"
@@ -94,15 +95,6 @@ Input read(const std::filesystem::path& path, const glm::dvec3& moved, ReadRepor
     return mesh;
 }
 
-// Drops metadata about a mesh and a body, which do not apply to a liquid that starts from the file. Metadata about the
-// position stay.
-void dropHistory(openvdb::FloatGrid& liquid) {
-    std::vector<std::string> names;
-    for (auto entry = liquid.beginMeta(); entry != liquid.endMeta(); ++entry)
-        if (entry->first.starts_with("bilayer:") && entry->first != metadata::origin) names.push_back(entry->first);
-    for (const std::string& name : names) liquid.removeMeta(name);
-}
-
 // Returns a position rounded to whole voxels: the origin of a liquid there.
 glm::dvec3 wholeVoxels(const glm::dvec3& place, double voxelSize) {
     return voxelSize * glm::round(place / voxelSize);
@@ -111,11 +103,7 @@ glm::dvec3 wholeVoxels(const glm::dvec3& place, double voxelSize) {
 // Returns the initial liquid relative to its origin, which is in its metadata if it is not zero.
 openvdb::FloatGrid::Ptr startingLiquid(const SeedArguments& a, const Input& first, const fluid::Placement& placement) {
     openvdb::initialize();
-    if (!a.into.empty()) {
-        const openvdb::FloatGrid::Ptr liquid = readVdb(a.into).grids().distance->deepCopy();
-        dropHistory(*liquid);
-        return liquid;
-    }
+    if (!a.into.empty()) return fluid::detail::liquidCopy(readVdb(a.into));
     float voxelSize = a.voxelSize;
     if (a.resolution > 0)
         voxelSize =

@@ -34,7 +34,7 @@ Path pathOf(const Ray& ray) {
 
 // The normal of the hit face, facing the path's start.
 glm::vec3 normalOf(const Mesh& mesh, const MeshHit& hit, const Path& path) {
-    const Corners c = cornersOf(mesh, hit.triangle);
+    const TriangleCorners c = cornersOf(mesh, hit.triangle);
     const glm::dvec3 n = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
     return glm::vec3(glm::dot(n, path.direction) > 0 ? -n : n);
 }

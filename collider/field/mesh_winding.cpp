@@ -62,7 +62,7 @@ int passes(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& point) {
 }
 
 // 1 if the ray leaves through the front of a triangle, -1 if it enters there, 0 if it passes by.
-int crossing(const AxisRay& ray, const Corners& c) {
+int crossing(const AxisRay& ray, const TriangleCorners& c) {
     const glm::dvec2 a = ray.across(c[0]), b = ray.across(c[1]), d = ray.across(c[2]), point = ray.across(ray.origin);
     const int facing = passes(a, b, point) + passes(b, d, point) + passes(d, a, point);
     if (facing == 0) return 0;

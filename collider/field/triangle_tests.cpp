@@ -32,8 +32,8 @@ glm::dvec3 TriangleRay::sheared(const glm::dvec3& corner) const {
     return {p[x_] - shearX_ * p[z_], p[y_] - shearY_ * p[z_], perZ_ * p[z_]};
 }
 
-bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& position) const {
-    const Corners projected{sheared(corners[0]), sheared(corners[1]), sheared(corners[2])};
+bool TriangleRay::meets(const TriangleCorners& corners, double& along, glm::dvec3& position) const {
+    const TriangleCorners projected{sheared(corners[0]), sheared(corners[1]), sheared(corners[2])};
     const auto& [a, b, c] = projected;
     // twice the areas between the axis and the edges; both triangles of a shared edge get the same number for it
     glm::dvec3 weights{c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x};
@@ -55,7 +55,7 @@ bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& posit
 
 // Whether the axis, outside the triangle, passes an edge within the tolerance. The weights become those of the closest
 // point on the edge.
-bool TriangleRay::passesEdge(const Corners& projected, glm::dvec3& weights) const {
+bool TriangleRay::passesEdge(const TriangleCorners& projected, glm::dvec3& weights) const {
     double nearest = tolerance_ * tolerance_;
     bool found = false;
     const glm::dvec3 areas = weights;
@@ -98,10 +98,10 @@ bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, dou
     return false;
 }
 
-bool overlaps(const RotatedBox& box, const Corners& corners) {
+bool overlaps(const RotatedBox& box, const TriangleCorners& corners) {
     const glm::dmat3 toBox = glm::transpose(box.axes);
-    const Corners p{toBox * (corners[0] - box.centre), toBox * (corners[1] - box.centre),
-                    toBox * (corners[2] - box.centre)};
+    const TriangleCorners p{toBox * (corners[0] - box.centre), toBox * (corners[1] - box.centre),
+                            toBox * (corners[2] - box.centre)};
     const auto separates = [&](const glm::dvec3& axis) {
         const double reach = glm::dot(glm::abs(axis), box.halfSize);
         const double a = glm::dot(axis, p[0]), b = glm::dot(axis, p[1]), c = glm::dot(axis, p[2]);
@@ -111,7 +111,7 @@ bool overlaps(const RotatedBox& box, const Corners& corners) {
         if (std::min({p[0][k], p[1][k], p[2][k]}) > box.halfSize[k] ||
             std::max({p[0][k], p[1][k], p[2][k]}) < -box.halfSize[k])
             return false;
-    const Corners edges{p[1] - p[0], p[2] - p[1], p[0] - p[2]};
+    const TriangleCorners edges{p[1] - p[0], p[2] - p[1], p[0] - p[2]};
     if (separates(glm::cross(edges[0], edges[1]))) return false;
     for (const glm::dvec3& e : edges)
         if (separates({0, -e.z, e.y}) || separates({e.z, 0, -e.x}) || separates({-e.y, e.x, 0})) return false;

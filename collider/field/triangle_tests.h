@@ -3,22 +3,15 @@
 // Tested by tests/collider/mesh_rays.cpp.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include "collider/field/mesh_tree.h"
 #include "collider/field/path.h"
+#include "sdf/base/triangle_corners.h"
 
 namespace bilayer::detail {
-
-using Corners = std::array<glm::dvec3, 3>;
-
-inline Corners cornersOf(const Mesh& mesh, std::uint32_t triangle) {
-    const glm::uvec3& t = mesh.triangles[triangle];
-    return {mesh.points[t.x], mesh.points[t.y], mesh.points[t.z]};
-}
 
 /// A ray in its sheared ray space: S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", JCGT 2 (2013)
 /// 65-82.
@@ -30,11 +23,11 @@ class TriangleRay {
 
     /// Whether the ray hits a triangle before `along`, which then becomes the distance of the hit. A ray that starts on
     /// the triangle hits it only if it enters there.
-    bool meets(const Corners& corners, double& along, glm::dvec3& position) const;
+    bool meets(const TriangleCorners& corners, double& along, glm::dvec3& position) const;
 
   private:
     glm::dvec3 sheared(const glm::dvec3& corner) const;
-    bool passesEdge(const Corners& projected, glm::dvec3& weights) const;
+    bool passesEdge(const TriangleCorners& projected, glm::dvec3& weights) const;
 
     glm::dvec3 start_;
     double tolerance_;
@@ -56,6 +49,6 @@ struct RotatedBox {
 
 /// Whether a box and a triangle overlap: T. Akenine-Moeller, "Fast 3D triangle-box overlap testing", Journal of
 /// Graphics Tools 6 (2001) 29-33.
-bool overlaps(const RotatedBox& box, const Corners& corners);
+bool overlaps(const RotatedBox& box, const TriangleCorners& corners);
 
 }  // namespace bilayer::detail

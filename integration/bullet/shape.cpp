@@ -95,7 +95,7 @@ void castRay(const Placed& body, const MeshTree& mesh, btTriangleRaycastCallback
         const auto hit = firstHit(mesh, {from + start * (displacement / length), displacement / length,
                                          length * callback.m_hitFraction - start});
         if (!hit) return;
-        const Corners corners = cornersOf(mesh.mesh(), hit->triangle);
+        const TriangleCorners corners = cornersOf(mesh.mesh(), hit->triangle);
         const glm::dvec3 normal = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
         const bool isBack = glm::dot(normal, displacement) > 0;
         start += hit->along;

@@ -57,8 +57,11 @@ struct SeedReport {
     std::size_t changedVoxels = 0;  ///< voxels that changed by more than 0.1 voxels
 };
 
-/// Combines a body with the caller's level set. Its voxel size and background stay the same to the bit. The grid gets a
-/// new tree; accessors and tree pointers from before keep referring to the old one.
+/// Combines a body with the caller's level set. The grid and the placed body are in world coordinates: a body with an
+/// origin is where that puts it, and the distances of a LevelSet with an origin must come from inWorld() (grids.h).
+///
+/// The grid's voxel size and background stay the same to the bit. It gets a new tree; accessors and tree pointers from
+/// before keep referring to the old one.
 ///
 /// The result is a true level set: openvdb::tools::checkLevelSet finds no fault in it. (One exception: it reports a
 /// background "less than 3 voxel units" where the caller's is so by its last bit, as that of createLevelSet(0.02, 3)

@@ -14,6 +14,7 @@
 #include <bilayer/integration/fluid/seed.h>
 #include <bilayer/sdf/grids.h>
 
+#include "integration/fluid/detail/liquid_copy.h"
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
@@ -41,14 +42,6 @@ fluid::Placement placementOf(const py::object& pose, const py::object& scale) {
     const auto f = factors.as<float>();
     for (const float factor : f) requirePositive(double(factor), "scale");
     return {poseOf(pose, "pose"), glm::vec3(f[0], f[1], f[2])};
-}
-
-// Metadata of a mesh do not apply to a liquid; those of the position stay.
-void dropHistory(openvdb::FloatGrid& liquid) {
-    std::vector<std::string> names;
-    for (auto entry = liquid.beginMeta(); entry != liquid.endMeta(); ++entry)
-        if (entry->first.starts_with("bilayer:") && entry->first != metadata::origin) names.push_back(entry->first);
-    for (const std::string& name : names) liquid.removeMeta(name);
 }
 
 LevelSet withoutOrigin(const LevelSet& levelSet) {
@@ -99,8 +92,7 @@ py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::
     openvdb::FloatGrid::Ptr grid;
     const auto [maxChange, where, changedVoxels] = cancellable(py::none(), [&](const Listener& listener) {
         options.progress = listener;
-        grid = liquid.grids().distance->deepCopy();
-        dropHistory(*grid);
+        grid = fluid::detail::liquidCopy(liquid);
         const Transform& voxels = liquid.grids().distance->transform();
         grid->setTransform(relativeTo(apart, voxels));
         const auto report = solid.visit([&](const auto& one) { return fluid::seed(*grid, one, placement, options); });

@@ -16,6 +16,7 @@
 #include "integration/python/define.h"
 #include "integration/python/objects.h"
 #include "integration/python/without_gil.h"
+#include "sdf/base/box_relations.h"
 
 namespace bilayer::python {
 namespace {
@@ -89,12 +90,6 @@ ShapeObject makeSpheres(const py::object& centres, const py::object& radii) {
     return made(withoutGil(make), "spheres", places, sizes);
 }
 
-bool meets(const Bounds& box, const Bounds& other) {
-    for (int axis = 0; axis < 3; ++axis)
-        if (box.lower[axis] > other.upper[axis] || box.upper[axis] < other.lower[axis]) return false;
-    return true;
-}
-
 ShapeObject makeTriangles(const SharedMesh& shared) {
     {
         const WithoutGil release;
@@ -105,7 +100,7 @@ ShapeObject makeTriangles(const SharedMesh& shared) {
             Triangle triangle;
             Bounds own;
             for (int k = 0; k < 3; ++k) own.add(triangle[std::size_t(k)] = shared->points[shared->triangles[i][k]]);
-            if (meets(own, box)) visitor(triangle, i);
+            if (detail::overlap(own, box)) visitor(triangle, i);
         }
     }};
     return made(ContactShape::triangles(sheet), "triangles", shared);

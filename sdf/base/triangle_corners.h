@@ -4,11 +4,21 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <glm/vec3.hpp>
+
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::detail {
 
 using TriangleCorners = std::array<glm::dvec3, 3>;
+
+inline TriangleCorners cornersOf(const Mesh& mesh, const glm::uvec3& t) {
+    return {glm::dvec3(mesh.points[t.x]), glm::dvec3(mesh.points[t.y]), glm::dvec3(mesh.points[t.z])};
+}
+inline TriangleCorners cornersOf(const Mesh& mesh, std::uint32_t triangle) {
+    return cornersOf(mesh, mesh.triangles[triangle]);
+}
 
 /// Min height of a triangle relative to its longest edge. The projection onto the plane of a flatter one is no better
 /// than one onto its edges.

@@ -10,6 +10,7 @@
 #include <limits>
 #include <utility>
 
+#include "sdf/base/box_relations.h"
 #include "sdf/base/polled_loop.h"
 
 namespace bilayer::detail {
@@ -20,29 +21,22 @@ constexpr std::size_t grain = 1024;  // leaves or triangles per task
 constexpr double roundingOfBoxes = 1e-12;
 /// Minimum speed of a line along an axis: with it, the line stays between two planes for longer than any box is wide.
 constexpr double minSpeed = 1e-30;
+/// Count of leaves that tell how much the boxes overlap, and max count of the leaves that one of them meets.
+constexpr std::size_t maxSamples = 256, maxMet = 4096;
+/// A leaf of a plain surface meets about ten leaves. Where it meets more than this, oriented boxes pay.
+constexpr std::size_t crowd = 64;
 
 TreeItem itemOf(const Mesh& mesh, unsigned triangle) {
     const glm::uvec3& t = mesh.triangles[triangle];
     return {mesh.points[t.x] + mesh.points[t.y] + mesh.points[t.z], triangle};
 }
 
-// The part of a line beyond a position, and a plane perpendicular to it onto which triangles are projected.
-/// Count of leaves that tell how much the boxes overlap, and max count of the leaves that one of them meets.
-constexpr std::size_t maxSamples = 256, maxMet = 4096;
-/// A leaf of a plain surface meets about ten leaves. Where it meets more than this, oriented boxes pay.
-constexpr std::size_t crowd = 64;
-
 Bounds boxAt(const BoxGroup& group, int i) {
     return {{group.lower[0][i], group.lower[1][i], group.lower[2][i]},
             {group.upper[0][i], group.upper[1][i], group.upper[2][i]}};
 }
 
-bool overlaps(const Bounds& a, const Bounds& b) {
-    for (int axis = 0; axis < 3; ++axis)
-        if (!(a.lower[axis] <= b.upper[axis] && b.lower[axis] <= a.upper[axis])) return false;
-    return true;
-}
-
+// The part of a line beyond a position, and a plane perpendicular to it onto which triangles are projected.
 class LineSearch {
   public:
     LineSearch(const glm::dvec3& from, const glm::dvec3& along, double first, double slack)
@@ -153,7 +147,7 @@ bool TriangleTree::isCrowded() const {
             const BoxGroup& next = boxes_.group(open.back());
             open.pop_back();
             for (int i = 0; i < treeWidth; ++i)
-                if (overlaps(box, boxAt(next, i))) {
+                if (overlap(box, boxAt(next, i))) {
                     const std::uint32_t child = next.firstChild + std::uint32_t(i);
                     if (boxes_.isLeaf(child))
                         ++count;

@@ -22,11 +22,6 @@ namespace {
 /// Surfaces closer than this count as touching, relative to the max coordinate: far above the rounding of doubles.
 constexpr double touching = 1e-12;
 
-TriangleCorners cornersOf(const Mesh& mesh, unsigned triangle) {
-    const glm::uvec3& t = mesh.triangles[triangle];
-    return {glm::dvec3(mesh.points[t.x]), glm::dvec3(mesh.points[t.y]), glm::dvec3(mesh.points[t.z])};
-}
-
 // Returns whether two triangles are more than `slack` apart along a direction of any length.
 bool separatedAlong(const glm::dvec3& axis, const TriangleCorners& a, const TriangleCorners& b, double slack) {
     const auto at = [&](const glm::dvec3& p) { return glm::dot(axis, p - a[0]); };

@@ -2,7 +2,6 @@
 #include "sdf/mesh/part_boxes.h"
 
 #include <algorithm>
-#include <glm/vector_relational.hpp>
 #include <limits>
 #include <utility>
 
@@ -34,15 +33,6 @@ int widestAxis(std::span<const RankedBox> items) {
 }
 
 }  // namespace
-
-bool holds(const Bounds& outer, const Bounds& inner) {
-    return glm::all(glm::lessThanEqual(outer.lower, inner.lower)) &&
-           glm::all(glm::greaterThanEqual(outer.upper, inner.upper));
-}
-
-bool overlap(const Bounds& a, const Bounds& b) {
-    return glm::all(glm::lessThanEqual(a.lower, b.upper)) && glm::all(glm::lessThanEqual(b.lower, a.upper));
-}
 
 PartBoxes::PartBoxes(std::vector<RankedBox> items) : items_(std::move(items)) {
     if (!items_.empty()) build(0, std::uint32_t(items_.size()));

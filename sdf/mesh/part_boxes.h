@@ -11,12 +11,9 @@
 
 #include <bilayer/sdf/mesh.h>
 
-namespace bilayer::detail {
+#include "sdf/base/box_relations.h"
 
-/// Returns whether one box lies within another. Touching counts.
-bool holds(const Bounds& outer, const Bounds& inner);
-/// Returns whether two boxes have a point in common.
-bool overlap(const Bounds& a, const Bounds& b);
+namespace bilayer::detail {
 
 /// A part with its bounding box. Ranks order the parts by size: a box within another has the higher rank.
 struct RankedBox {

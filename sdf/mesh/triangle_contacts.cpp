@@ -159,18 +159,13 @@ std::vector<Segment> TriangleContacts::within(unsigned triangle) const {
     const EdgePlanes edges(face, slack_);
     tree_.descend(TriangleOverlap(tree_.boxOf(triangle), face, edges, slack_), [&](unsigned other) {
         if (other == triangle) return;
-        const TriangleCorners corners = cornersOf(other);
+        const TriangleCorners corners = cornersOf(mesh_, other);
         const double height[] = {face.height(corners[0]), face.height(corners[1]), face.height(corners[2])};
         const auto [low, high] = std::minmax({height[0], height[1], height[2]});
         if (low <= 2 * slack_ && high >= -2 * slack_ && !edges.isBeyond(corners))
             add(triangle, face, other, corners, found);
     });
     return found;
-}
-
-TriangleCorners TriangleContacts::cornersOf(unsigned triangle) const {
-    const glm::uvec3& t = mesh_.triangles[triangle];
-    return {glm::dvec3(mesh_.points[t.x]), glm::dvec3(mesh_.points[t.y]), glm::dvec3(mesh_.points[t.z])};
 }
 
 void TriangleContacts::add(unsigned triangle, const DoubleTriangle& face, unsigned other,

@@ -21,8 +21,7 @@ struct DoubleTriangle {
     glm::dvec3 normal;  // unit normal, or 0 for a triangle without area
     double area;
 
-    DoubleTriangle(const Mesh& mesh, const glm::uvec3& t)
-        : corners{glm::dvec3(mesh.points[t.x]), glm::dvec3(mesh.points[t.y]), glm::dvec3(mesh.points[t.z])} {
+    DoubleTriangle(const Mesh& mesh, const glm::uvec3& t) : corners(cornersOf(mesh, t)) {
         normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
         area = 0.5 * glm::length(normal);
         normal = area > 0 ? 0.5 / area * normal : glm::dvec3(0);
@@ -46,7 +45,6 @@ class TriangleContacts {
     std::vector<Segment> within(unsigned triangle) const;
 
   private:
-    TriangleCorners cornersOf(unsigned triangle) const;
     void add(unsigned triangle, const DoubleTriangle& face, unsigned other, const TriangleCorners& corners,
              std::vector<Segment>& found) const;
     bool alongSharedEdge(unsigned triangle, unsigned other, const DoubleTriangle& face, const Segment& segment) const;

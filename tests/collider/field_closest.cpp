@@ -37,7 +37,7 @@ constexpr double farTolerance = 1e-6;   // relative, of distances farther away
 constexpr double interpolantOff = 0.1;  // maximum interpolation error of the torus below [voxels]
 constexpr double samePlace = 1e-4;      // triangles within this distance of a closest point share it [voxels]
 
-glm::dvec3 normalOf(const Corners& c) {
+glm::dvec3 normalOf(const TriangleCorners& c) {
     return glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
 }
 
@@ -50,7 +50,7 @@ double distanceToSegment(const glm::dvec3& p, const glm::dvec3& a, const glm::dv
 glm::dvec3 normalAt(const Mesh& mesh, const glm::dvec3& place, double room) {
     glm::dvec3 sum(0);
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        const Corners c = cornersOf(mesh, i);
+        const TriangleCorners c = cornersOf(mesh, i);
         if (squaredDistance(place, c[0], c[1], c[2]) > room * room) continue;
         double angle = glm::two_pi<double>();
         for (std::size_t k = 0; k < 3; ++k)
@@ -65,7 +65,7 @@ glm::dvec3 normalAt(const Mesh& mesh, const glm::dvec3& place, double room) {
 }
 
 // Whether a point on a triangle lies on the claimed feature, and on no smaller one.
-bool isFeature(const Corners& c, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
+bool isFeature(const TriangleCorners& c, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
     std::array<bool, 3> onEdge, onCorner;
     for (std::size_t k = 0; k < 3; ++k) {
         onEdge[k] = distanceToSegment(place, c[k], c[(k + 1) % 3]) < room;
@@ -85,7 +85,8 @@ bool isFeature(const Corners& c, const glm::dvec3& place, const ClosestPoint& cl
 
 // Whether the feature at a point is unambiguous. On the claimed feature the point must be far from others. No triangle
 // there may be near it with two of its edges, as needles are over a long stretch from their tips.
-bool isClear(const Mesh& mesh, const Corners& own, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
+bool isClear(const Mesh& mesh, const TriangleCorners& own, const glm::dvec3& place, const ClosestPoint& claimed,
+             double room) {
     if (claimed.feature == Feature::vertex) return true;
     for (std::size_t k = 0; k < 3; ++k) {
         if (glm::distance(place, own[k]) < 2 * room) return false;
@@ -93,7 +94,7 @@ bool isClear(const Mesh& mesh, const Corners& own, const glm::dvec3& place, cons
         if (!on && distanceToSegment(place, own[k], own[(k + 1) % 3]) < 2 * room) return false;
     }
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        const Corners c = cornersOf(mesh, i);
+        const TriangleCorners c = cornersOf(mesh, i);
         int met = 0;
         for (std::size_t k = 0; k < 3; ++k) met += distanceToSegment(place, c[k], c[(k + 1) % 3]) < 2 * room;
         if (met > 1) return false;
@@ -130,7 +131,7 @@ Tally check(const Mesh& mesh, float resolution, int count, int normals, unsigned
         worst = std::max(worst, distance < 10 * h ? off / h : off / distance);
         tally.wrongSigns += distance > room && (closest.distance < 0) != (truth.winding(p) > 0);
         const glm::dvec3 place(closest.position);
-        const Corners c = cornersOf(mesh, closest.triangle);
+        const TriangleCorners c = cornersOf(mesh, closest.triangle);
         const double rounding = 1e-7 * (glm::length(place) + distance);
         tally.wrongPlaces += std::abs(glm::distance(p, place) - distance) > tolerance * h + 8 * rounding ||
                              std::sqrt(squaredDistance(place, c[0], c[1], c[2])) > rounding;
@@ -311,7 +312,7 @@ TEST_CASE("a point on an edge or a vertex has that feature, and its pseudonormal
                 !(glm::distance(glm::dvec3(closest.normal), normalAt(mesh, glm::dvec3(place), 10 * room)) < 1e-3);
         };
         for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-            const Corners c = cornersOf(mesh, i);
+            const TriangleCorners c = cornersOf(mesh, i);
             for (std::size_t k = 0; k < 3; ++k) {
                 ask(glm::vec3(c[k]), Feature::vertex);
                 ask(glm::vec3(glm::mix(c[k], c[(k + 1) % 3], random(0.1, 0.9))), Feature::edge);

@@ -44,7 +44,7 @@ struct Crossing {
     double along, margin;
 };
 
-Crossing crossing(const Path& path, const Corners& c) {
+Crossing crossing(const Path& path, const TriangleCorners& c) {
     const glm::dvec3 n = glm::cross(c[1] - c[0], c[2] - c[0]);
     const double steep = glm::dot(n, path.direction);
     if (steep == 0) return {infinity, -infinity};
@@ -82,7 +82,7 @@ std::string faultOf(const MeshTree& tree, const Path& path) {
     if (maybe == infinity) return "met nothing";
     if (hit->along > surely + exact) return "not the first";
     if (hit->along > path.length) return "beyond the end";
-    const Corners c = cornersOf(tree.mesh(), hit->triangle);
+    const TriangleCorners c = cornersOf(tree.mesh(), hit->triangle);
     if (std::sqrt(squaredDistance(hit->position, c[0], c[1], c[2])) > exact) return "not on the triangle";
     if (glm::distance(path.at(hit->along), hit->position) > near) return "not on the path";
     return "";
@@ -148,7 +148,7 @@ TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing n
     for (int i = 0; i < 100000; ++i) {
         // slivers along x, about as thin as the tolerance; the ray is the z axis, before both are rotated
         const double width = std::pow(10, random(-10, -6));
-        Corners corners, flat;
+        TriangleCorners corners, flat;
         for (std::size_t k = 0; k < 3; ++k) {
             corners[k] = {random(-1, 1), width * random(-1, 1), random(1, 2)};
             flat[k] = {corners[k].x, corners[k].y, 0};
@@ -225,7 +225,7 @@ namespace {
 
 // Whether a part of a triangle remains after clipping by the box's planes (I. Sutherland, G. Hodgman, "Reentrant
 // polygon clipping", 1974).
-bool leftInBox(const RotatedBox& box, const Corners& corners, double room) {
+bool leftInBox(const RotatedBox& box, const TriangleCorners& corners, double room) {
     std::vector<glm::dvec3> polygon(corners.begin(), corners.end());
     for (int axis = 0; axis < 3; ++axis)
         for (const double side : {-1.0, 1.0}) {

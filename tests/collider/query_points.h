@@ -32,7 +32,8 @@ inline std::vector<glm::vec3> pointsAround(const Mesh& mesh, double h, int count
     };
     std::vector<glm::vec3> points;
     for (int i = 0; i < count; ++i) {
-        const detail::Corners c = detail::cornersOf(mesh, std::size_t(random(0, double(mesh.triangles.size()) - 0.5)));
+        const detail::TriangleCorners c =
+            detail::cornersOf(mesh, std::size_t(random(0, double(mesh.triangles.size()) - 0.5)));
         const double u = random(0, 1), v = random(0, 1 - u);
         points.push_back(glm::vec3(c[0] + u * (c[1] - c[0]) + v * (c[2] - c[0]) +
                                    random(-5, 5) * h * glm::dvec3(random.direction())));

@@ -97,12 +97,11 @@ WrongSides wrongSides(const LevelSet& levelSet, const Mesh& mesh, std::span<cons
     return wrong;
 }
 
-void requireNone(const WrongSides& wrong, std::size_t oneWrongIn) {
-    CAPTURE(wrong.points, wrong.close);
+void requireNone(const WrongSides& wrong) {
+    CAPTURE(wrong.points);
     CHECK(wrong.closest == 0);
     CHECK(wrong.inside == 0);
     CHECK(wrong.sample == 0);
-    CHECK(wrong.closeClosest <= wrong.close / oneWrongIn);
 }
 
 // Counts how often queries contradict each other at points of the band, of the box, and far away.
@@ -181,6 +180,7 @@ TEST_CASE("closest, inside and sample have the side of the winding number where 
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
+    std::size_t close = 0, wrong = 0;
     for (int round = 0; round < 3; ++round)
         for (const auto& [name, shape] : meetingSurfaces(random)) {
             const Mesh mesh = tilted(shape);
@@ -189,8 +189,13 @@ TEST_CASE("closest, inside and sample have the side of the winding number where 
             CAPTURE(round, name, voxelSize, levelSet.signReason());
             // signs of a flood, and of voxels that contradict each other, are not those of winding numbers
             if (levelSet.sign() == "flood" || levelSet.signConflicts() > 0) continue;
-            requireNone(wrongSides(levelSet, mesh, pointsAround(mesh, 0.4 * double(voxelSize), 3000, seed)), 500);
+            const WrongSides found =
+                wrongSides(levelSet, mesh, pointsAround(mesh, 0.4 * double(voxelSize), 3000, seed));
+            requireNone(found);
+            close += found.close, wrong += found.closeClosest;
         }
+    // of all meshes together: slivers that cross within a voxel may have several of these, most meshes have none
+    CHECK(wrong <= close / 2000);
 }
 
 TEST_CASE("closest, inside and sample have the side of the winding number on public meshes that meet themselves") {
@@ -206,6 +211,9 @@ TEST_CASE("closest, inside and sample have the side of the winding number on pub
         const Bounds box = bounds(mesh);
         std::vector<glm::vec3> points = pointsAround(mesh, double(levelSet.voxelSize()), 10000, seed);
         for (int i = 0; i < 50000; ++i) points.push_back(box.centre() + random.point(0.5 * double(box.longestSide())));
-        requireNone(wrongSides(levelSet, mesh, points), 10000);
+        const WrongSides found = wrongSides(levelSet, mesh, points);
+        CAPTURE(found.close);
+        requireNone(found);
+        CHECK(found.closeClosest <= found.close / 10000);
     }
 }

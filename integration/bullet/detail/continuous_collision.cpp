@@ -3,7 +3,6 @@
 
 #include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
-#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <LinearMath/btAabbUtil2.h>
 #include <tbb/parallel_for_each.h>
 
@@ -21,6 +20,7 @@
 #include "integration/bullet/detail/body_sweep.h"
 #include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/leaf_shapes.h"
 
 namespace bilayer::bullet::detail {
 
@@ -58,19 +58,11 @@ struct LeafShape {
 /// Visits the shapes that take part.
 /// @param found  callback (const LeafShape&)
 template <class Found>
-void visitLeafShapes(const btCollisionShape* shape, const btTransform& local, Found&& found) {
-    if (!shape->isCompound()) {
-        if (const LeafShape leaf{shape, local}; leaf.takesPart()) found(leaf);
-        return;
-    }
-    const auto* compound = static_cast<const btCompoundShape*>(shape);
-    for (int i = 0; i < compound->getNumChildShapes(); ++i)
-        visitLeafShapes(compound->getChildShape(i), local * compound->getChildTransform(i), found);
-}
-
-template <class Found>
-void visitLeafShapes(const btCollisionObject& object, Found&& found) {
-    visitLeafShapes(object.getCollisionShape(), btTransform::getIdentity(), found);
+void visitShapesOf(const btCollisionObject& object, Found&& found) {
+    visitLeafShapes(*object.getCollisionShape(), btTransform::getIdentity(),
+                    [&](const btCollisionShape& shape, const btTransform& local) {
+                        if (const LeafShape leaf{&shape, local}; leaf.takesPart()) found(leaf);
+                    });
 }
 
 /// Two bodies that may meet in a step; one of them is fast.
@@ -88,9 +80,9 @@ struct SweptPair {
         impact = {};
         checkedA = a->stopTime(), checkedB = b->stopTime();
         if (std::min(checkedA, checkedB) >= 1 && a->maxDisplacement(*b) <= margin) return;
-        visitLeafShapes(a->object(), [&](const LeafShape& one) {
+        visitShapesOf(a->object(), [&](const LeafShape& one) {
             const ContactShape ofOne = contactShapeOf(*one.shape);
-            visitLeafShapes(b->object(), [&](const LeafShape& two) {
+            visitShapesOf(b->object(), [&](const LeafShape& two) {
                 if (!one.field() && !two.field()) return;
                 const ContactShape ofTwo = contactShapeOf(*two.shape);
                 const Penetration first = firstPenetration(one.swept(ofOne, a->sweep()), two.swept(ofTwo, b->sweep()));
@@ -147,7 +139,7 @@ struct SweptPair {
 /// Maximum separation of contacts with an object; nothing without a field.
 std::optional<float> marginOf(const btCollisionObject& object) {
     std::optional<float> margin;
-    visitLeafShapes(object, [&](const LeafShape& leaf) {
+    visitShapesOf(object, [&](const LeafShape& leaf) {
         if (const Shape* field = leaf.field()) margin = std::max(margin.value_or(0), float(field->getMargin()));
     });
     return margin;

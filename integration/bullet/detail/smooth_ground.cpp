@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/smooth_ground.h"
 
-#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
 #include <LinearMath/btAabbUtil2.h>
 
@@ -18,6 +17,7 @@
 #include "integration/bullet/detail/compound.h"
 #include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/leaf_shapes.h"
 #include "integration/bullet/detail/pair_contacts.h"
 #include "integration/bullet/detail/velocity.h"
 
@@ -36,19 +36,16 @@ constexpr float minSlope = 1e-3f;
 constexpr float maxChange = 0.2f;
 
 bool isTriangles(const btCollisionShape& shape) {
-    if (shape.isCompound()) {
-        const auto& compound = static_cast<const btCompoundShape&>(shape);
-        for (int i = 0; i < compound.getNumChildShapes(); ++i)
-            if (!isTriangles(*compound.getChildShape(i))) return false;
-        return true;
-    }
     const int type = shape.getShapeType();
     return shape.isConcave() && type != FAST_CONCAVE_MESH_PROXYTYPE && type != STATIC_PLANE_PROXYTYPE;
 }
 
 /// Whether an object consists of triangles and does not move, even if it is kinematic.
 bool isGround(const btCollisionObject& object) {
-    if (!object.isStaticOrKinematicObject() || !isTriangles(*object.getCollisionShape())) return false;
+    const auto isOther = [](const btCollisionShape& leaf, const btTransform&) { return !isTriangles(leaf); };
+    if (!object.isStaticOrKinematicObject() ||
+        anyLeafShape(*object.getCollisionShape(), btTransform::getIdentity(), isOther))
+        return false;
     const Velocity velocity = velocityOf(object);
     return velocity.linear.isZero() && velocity.angular.isZero();
 }
@@ -56,13 +53,6 @@ bool isGround(const btCollisionObject& object) {
 /// The maximum turn of the smooth edges in the bounding box of a body [rad].
 /// @param at  pose of the shape with the edges
 float turnUnder(const btRigidBody& body, const btCollisionShape& shape, const btTransform& at) {
-    if (shape.isCompound()) {
-        const auto& compound = static_cast<const btCompoundShape&>(shape);
-        float turn = 0;
-        for (int i = 0; i < compound.getNumChildShapes(); ++i)
-            turn = std::max(turn, turnUnder(body, *compound.getChildShape(i), at * compound.getChildTransform(i)));
-        return turn;
-    }
     btVector3 lower, upper;
     body.getCollisionShape()->getAabb(at.inverse() * body.getWorldTransform(), lower, upper);
     std::vector<Triangle> triangles;
@@ -74,22 +64,31 @@ float turnUnder(const btRigidBody& body, const btCollisionShape& shape, const bt
     return maxSmoothTurn(triangles);
 }
 
-/// The turn of a body's own surface at a place, in the axes of its shape [rad].
-float turnOf(const btCollisionShape& shape, const btVector3& place) {
-    if (isField(shape)) {
-        const auto& field = static_cast<const Shape&>(shape);
-        const ColliderData& data = field.collider().data();
-        const Placed placed = field.placed(btTransform::getIdentity());
-        const glm::vec3 inField = glm::conjugate(placed.pose.rotation) * (toGlm(place) - placed.pose.position);
-        return data.body.mesh ? smoothTurnAt(data.meshTree(), inField / placed.scale) : 0;
-    }
+/// The same of an object of triangles.
+float turnUnder(const btRigidBody& body, const btCollisionObject& ground) {
     float turn = 0;
-    if (!shape.isCompound()) return turn;
-    const auto& compound = static_cast<const btCompoundShape&>(shape);
-    for (int i = 0; i < compound.getNumChildShapes(); ++i) {
-        const btVector3 inChild = compound.getChildTransform(i).inverse() * place;
-        turn = std::max(turn, turnOf(*compound.getChildShape(i), inChild));
-    }
+    visitLeafShapes(
+        *ground.getCollisionShape(), ground.getWorldTransform(),
+        [&](const btCollisionShape& leaf, const btTransform& at) { turn = std::max(turn, turnUnder(body, leaf, at)); });
+    return turn;
+}
+
+/// The turn of a field's surface at a place, in the axes of its shape [rad].
+float turnOf(const Shape& field, const btVector3& place) {
+    const ColliderData& data = field.collider().data();
+    const Placed placed = field.placed(btTransform::getIdentity());
+    const glm::vec3 inField = glm::conjugate(placed.pose.rotation) * (toGlm(place) - placed.pose.position);
+    return data.body.mesh ? smoothTurnAt(data.meshTree(), inField / placed.scale) : 0;
+}
+
+/// The turn of a body's own surface at a place, in the body's axes [rad].
+float turnOf(const btRigidBody& body, const btVector3& place) {
+    float turn = 0;
+    visitLeafShapes(*body.getCollisionShape(), btTransform::getIdentity(),
+                    [&](const btCollisionShape& leaf, const btTransform& at) {
+                        if (isField(leaf))
+                            turn = std::max(turn, turnOf(static_cast<const Shape&>(leaf), at.inverse() * place));
+                    });
     return turn;
 }
 
@@ -115,8 +114,7 @@ const Velocity* SmoothGround::velocityBefore(const btCollisionObject& object) co
 
 float SmoothGround::turnUnder(const Ground& ground) {
     const auto [turn, isNew] = turns_.try_emplace(ground, 0.f);
-    const auto& [body, object] = ground;
-    if (isNew) turn->second = detail::turnUnder(*body, *object->getCollisionShape(), object->getWorldTransform());
+    if (isNew) turn->second = detail::turnUnder(*ground.first, *ground.second);
     return turn->second;
 }
 
@@ -139,7 +137,7 @@ float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& g
                                  along.length(), body.computeImpulseDenominator(place, normal) / body.getInvMass()};
         if (impact.speed < restSpeed * seconds * body.getGravity().length()) continue;
         if (!(std::abs(impact.before) > minSlope * impact.speed)) continue;
-        const float own = turnOf(*body.getCollisionShape(), bodyIsFirst ? point.m_localPointA : point.m_localPointB);
+        const float own = turnOf(body, bodyIsFirst ? point.m_localPointA : point.m_localPointB);
         loss += impact.loss(turnUnder(ground) + (own > 0 ? own + rotation : 0));
     }
     return loss;
