@@ -7,23 +7,16 @@
 // peak memory of each builder requires a process of its own.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <vector>
 
 #include "bench/builders.h"
+#include "sdf/base/stopwatch.h"
 
 namespace bilayer::bench {
 
-/// Measures time from its construction on.
-class Stopwatch {
-  public:
-    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
-  private:
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
+using detail::Stopwatch;
 
 /// Limit of peak memory: this factor times input plus output, plus a constant. The constant covers what does not grow:
 /// thread stacks, the allocator's pools, one brick in work per thread.

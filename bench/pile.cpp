@@ -27,11 +27,6 @@ constexpr float friction = 0.5f;
 constexpr float restingSpeed = 0.1f, restingSpin = 1;  // thresholds below which bodies could sleep [m/s, rad/s]
 constexpr float splitAt = 0.01f;  // Bullet splits off deeper penetration [fraction of a body's size]
 
-btTransform toTransform(const Pose& pose) {
-    const auto& [p, q] = pose;
-    return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
-}
-
 btVector3 inertiaOf(const Member& member) {
     const MassProperties& of = member.form->mass;
     const glm::vec3 inertia = of.principalInertia * float(double(member.mass) / of.volume);
@@ -85,7 +80,7 @@ class Arena {
     void add(const Member& member) {
         const btVector3 inertia = member.mass > 0 ? inertiaOf(member) : btVector3(0, 0, 0);
         btRigidBody::btRigidBodyConstructionInfo info(member.mass, nullptr, member.form->shape, inertia);
-        info.m_startWorldTransform = toTransform(member.pose);
+        info.m_startWorldTransform = toBullet(member.pose);
         info.m_friction = friction;
         bodies_.push_back(std::make_unique<btRigidBody>(info));
         if (member.mass > 0) bodies_.back()->setActivationState(DISABLE_DEACTIVATION);

@@ -3,7 +3,6 @@
 // Tested by tests/tools/build.cpp through run().
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -19,6 +18,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/body.h"
+#include "sdf/base/stopwatch.h"
 
 namespace bilayer::tools {
 
@@ -83,14 +83,7 @@ Json toJson(const detail::Body& body, const glm::dvec3& origin);
 /// Adds all of it except the mass.
 void addRows(Table& table, const detail::Body& body);
 
-/// Measures the seconds since its construction.
-class Stopwatch {
-  public:
-    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
-  private:
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
+using detail::Stopwatch;
 
 /// A progress bar on stderr during its lifetime, if stderr is a terminal.
 class ProgressBar {

@@ -36,7 +36,7 @@ constexpr int projections = 4;
 // Lower bounds of the squared distances from a box to the boxes of a group: the largest of the distances of their
 // bounds in either frame and along a direction, which points from the group to the box. Returns the slots whose bound
 // is below a limit.
-unsigned boundDistances(const OrientedBounds& box, const OrientedGroup& group, const GroupFrame& frame,
+unsigned boundDistances(const OrientedBounds& box, const OrientedBoxes& group, const GroupFrame& frame,
                         const glm::dvec3& direction, double limit2, double (&bounds2)[treeWidth]) {
     const hn::CappedTag<double, treeWidth> tag;
     const hn::Rebind<float, decltype(tag)> floats;
@@ -141,11 +141,11 @@ class LeafCache {
 unsigned nearerThan(const TriangleCorners& triangle, const PosedLeaf& leaf, double limit2) {
     using D = hn::CappedTag<double, treeWidth>;
     const D tag;
-    const TriangleLanes<D> one(sameInAll(tag, triangle[0]), sameInAll(tag, triangle[1]), sameInAll(tag, triangle[2]));
+    const CornerLanes<D> one(sameInAll(tag, triangle[0]), sameInAll(tag, triangle[1]), sameInAll(tag, triangle[2]));
     unsigned near = 0;
     for (std::size_t i = 0; i < leaf.count; i += hn::Lanes(tag)) {
-        const TriangleLanes<D> all(loadLanes(tag, leaf.lanes[0], i), loadLanes(tag, leaf.lanes[1], i),
-                                   loadLanes(tag, leaf.lanes[2], i));
+        const CornerLanes<D> all(loadLanes(tag, leaf.lanes[0], i), loadLanes(tag, leaf.lanes[1], i),
+                                 loadLanes(tag, leaf.lanes[2], i));
         std::uint8_t bits[8] = {};
         hn::StoreMaskBits(tag, hn::Lt(triangleDistance2(tag, one, all), hn::Set(tag, limit2)), bits);
         near |= unsigned(bits[0]) << i;
@@ -211,7 +211,7 @@ class PairSearch {
     template <class MakePair>
     void open(PosedTree& mesh, std::uint32_t node, const OrientedBounds& other, const glm::dvec3& direction,
               MakePair&& pairOf) {
-        const OrientedGroup& group = mesh.group(node);
+        const OrientedBoxes& group = mesh.group(node);
         alignas(64) double bounds2[treeWidth];
         const auto first = std::ptrdiff_t(pending_);
         unsigned near = boundDistances(other, group, mesh.frameOf(group), direction, limit2_, bounds2);

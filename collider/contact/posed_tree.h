@@ -29,7 +29,7 @@ struct OrientedBounds {
 /// A node, and the group and slot that hold its box; no group for a root.
 struct PosedNode {
     std::uint32_t index;
-    const OrientedGroup* group = nullptr;
+    const OrientedBoxes* group = nullptr;
     std::uint32_t slot = 0;
 };
 
@@ -74,11 +74,11 @@ class PosedTree {
     }
 
     const WideTree& tree() const { return mesh_.tree(); }
-    const OrientedGroup& group(std::uint32_t node) const { return mesh_.group(node); }
+    const OrientedBoxes& group(std::uint32_t node) const { return mesh_.group(node); }
     std::size_t triangleCount() const { return mesh_.mesh().triangles.size(); }
 
-    const GroupFrame& frameOf(const OrientedGroup& group) {
-        const std::size_t place = (reinterpret_cast<std::uintptr_t>(&group) / sizeof(OrientedGroup)) % keptFrames;
+    const GroupFrame& frameOf(const OrientedBoxes& group) {
+        const std::size_t place = (reinterpret_cast<std::uintptr_t>(&group) / sizeof(OrientedBoxes)) % keptFrames;
         if (ofFrame_[place] != &group) {
             ofFrame_[place] = &group;
             frames_[place] = makeFrame(group);
@@ -130,7 +130,7 @@ class PosedTree {
   private:
     static constexpr std::size_t keptFrames = 64;
 
-    GroupFrame makeFrame(const OrientedGroup& group) const {
+    GroupFrame makeFrame(const OrientedBoxes& group) const {
         glm::dmat3 stored;
         for (int k = 0; k < 3; ++k) stored[k] = glm::dvec3(group.axes[k][0], group.axes[k][1], group.axes[k][2]);
         const glm::dmat3 axes = orthonormal(stored), off = axes - stored;
@@ -144,7 +144,7 @@ class PosedTree {
     double unit_;
     glm::dvec3 origin_;
     glm::dmat3 linear_;
-    std::array<const OrientedGroup*, keptFrames> ofFrame_;
+    std::array<const OrientedBoxes*, keptFrames> ofFrame_;
     std::array<GroupFrame, keptFrames> frames_;
 };
 

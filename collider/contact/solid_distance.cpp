@@ -183,7 +183,7 @@ class SolidSearch {
 
     /// Replaces a node by its children, the nearest last.
     void open(std::uint32_t node) {
-        const OrientedGroup& group = mesh_.group(node);
+        const OrientedBoxes& group = mesh_.group(node);
         const std::size_t first = pending_;
         for (std::uint32_t slot = 0; slot < treeWidth; ++slot)
             if (group.lower[0][slot] <= group.upper[0][slot]) push({group.firstChild + slot, &group, slot});

@@ -23,11 +23,11 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Triangles with their edges and normals; the triangle in each lane is one and the same, or another one.
 template <class D>
-struct TriangleLanes {
+struct CornerLanes {
     VectorLanes<D> corners[3], edges[3], normal;  // the edges begin at the corners
     hn::Vec<D> lengths2[3];                       // of the edges
 
-    TriangleLanes(const VectorLanes<D>& first, const VectorLanes<D>& second, const VectorLanes<D>& third)
+    CornerLanes(const VectorLanes<D>& first, const VectorLanes<D>& second, const VectorLanes<D>& third)
         : corners{first, second, third} {
         for (int i = 0; i < 3; ++i) {
             edges[i] = corners[(i + 1) % 3] - corners[i];
@@ -66,7 +66,7 @@ HWY_INLINE hn::Vec<D> edgeDistance2(D tag, const VectorLanes<D>& p, const Vector
 
 /// Whether a point projects into a triangle.
 template <class D>
-HWY_INLINE hn::Mask<D> covers(D tag, const TriangleLanes<D>& triangle, const VectorLanes<D>& point) {
+HWY_INLINE hn::Mask<D> covers(D tag, const CornerLanes<D>& triangle, const VectorLanes<D>& point) {
     const auto zero = hn::Zero(tag);
     auto inside = hn::Gt(dot<D>(triangle.normal, triangle.normal), zero);
     for (int i = 0; i < 3; ++i) {
@@ -79,7 +79,7 @@ HWY_INLINE hn::Mask<D> covers(D tag, const TriangleLanes<D>& triangle, const Vec
 /// The squared distance from the corners of one triangle to the interior of another. 0 where an edge of the first
 /// passes through the second. Infinite where there is neither.
 template <class D>
-HWY_INLINE hn::Vec<D> cornerDistance2(D tag, const TriangleLanes<D>& corners, const TriangleLanes<D>& face) {
+HWY_INLINE hn::Vec<D> cornerDistance2(D tag, const CornerLanes<D>& corners, const CornerLanes<D>& face) {
     const auto zero = hn::Zero(tag);
     auto result = hn::Set(tag, std::numeric_limits<double>::infinity());
     hn::Vec<D> heights[3];
@@ -103,7 +103,7 @@ HWY_INLINE hn::Vec<D> cornerDistance2(D tag, const TriangleLanes<D>& corners, co
 
 /// The squared distances of two triangles in each lane, to roundings of those of closestPoints().
 template <class D>
-HWY_INLINE hn::Vec<D> triangleDistance2(D tag, const TriangleLanes<D>& a, const TriangleLanes<D>& b) {
+HWY_INLINE hn::Vec<D> triangleDistance2(D tag, const CornerLanes<D>& a, const CornerLanes<D>& b) {
     auto result = hn::Min(cornerDistance2<D>(tag, a, b), cornerDistance2<D>(tag, b, a));
     for (int i = 0; i < 3; ++i)
         for (int k = 0; k < 3; ++k)

@@ -43,7 +43,7 @@ inline void fetch(const Item& item) {
 // The search for one point below given nodes.
 class NearestSearch {
   public:
-    void begin(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound) {
+    void begin(const WideTree& tree, const OrientedBoxes* groups, const glm::dvec3& point, float bound) {
         tree_ = &tree;
         groups_ = groups;
         point_ = SplitPoint(point);
@@ -92,7 +92,7 @@ class NearestSearch {
     }
 
     // Pushes the nodes of a group that may contain a nearer triangle, the nearest of them last.
-    void open(const OrientedGroup& group, float limit2, NodeStack& stack) const {
+    void open(const OrientedBoxes& group, float limit2, NodeStack& stack) const {
         alignas(64) float gaps[treeWidth];
         // whole voxels first, without rounding
         const glm::vec3 origin(group.origin[0], group.origin[1], group.origin[2]),
@@ -147,7 +147,7 @@ class NearestSearch {
     }
 
     const WideTree* tree_;
-    const OrientedGroup* groups_;
+    const OrientedBoxes* groups_;
     SplitPoint point_;
     float best2_;
     std::uint32_t part_;
@@ -157,7 +157,7 @@ class NearestSearch {
 // in the lowest bits.
 class EntrySearch {
   public:
-    void begin(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound,
+    void begin(const WideTree& tree, const OrientedBoxes* groups, const glm::dvec3& point, float bound,
                const EntryPlace& place) {
         search_.begin(tree, groups, point, bound);
         entries_ = place.entries;
@@ -238,14 +238,14 @@ class EntrySearch {
     alignas(64) std::int32_t keys_[BlockEntries::maxEntries * treeWidth];
 };
 
-std::uint32_t searchAll(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound) {
+std::uint32_t searchAll(const WideTree& tree, const OrientedBoxes* groups, const glm::dvec3& point, float bound) {
     NearestSearch search;
     search.begin(tree, groups, point, bound);
     search.visit(tree.root());
     return search.part();
 }
 
-std::uint32_t searchEntry(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound,
+std::uint32_t searchEntry(const WideTree& tree, const OrientedBoxes* groups, const glm::dvec3& point, float bound,
                           const EntryPlace& place) {
     EntrySearch search;
     search.begin(tree, groups, point, bound, place);
@@ -254,7 +254,7 @@ std::uint32_t searchEntry(const WideTree& tree, const OrientedGroup* groups, con
 }
 
 // Interleaves the searches of several points, so that prefetches are well ahead of their use.
-void searchEntries(const WideTree& tree, const OrientedGroup* groups, double perMetre,
+void searchEntries(const WideTree& tree, const OrientedBoxes* groups, double perMetre,
                    std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
                    std::span<std::uint32_t> parts) {
     EntrySearch searches[together];

@@ -57,7 +57,7 @@ MeshTree::MeshTree(std::shared_ptr<const Mesh> mesh, float voxelSize)
     : mesh_((validate(*mesh), std::move(mesh))), voxelSize_(voxelSize), perMetre_(1 / double(voxelSize)) {
     const auto makeTree = [&] {
         tree_ = makeWideTree(*mesh_, voxelSize_, nullptr, {TreeOrder::split, maxEdge});
-        groups_ = makeOrientedGroups(tree_);
+        groups_ = makeOrientedBoxes(tree_);
     };
     tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(*mesh_, minHeight * double(voxelSize_)); });
 }
@@ -160,7 +160,7 @@ void MeshTree::toEdge(NearestFeature& found, const std::array<glm::dvec3, 3>& c)
 
 std::size_t MeshTree::memoryBytes() const {
     return mesh_->points.size() * sizeof(glm::vec3) + mesh_->triangles.size() * sizeof(glm::uvec3) +
-           tree_.leafCount * sizeof(WideLeaf) + tree_.groupCount * (sizeof(BoxGroup) + sizeof(OrientedGroup)) +
+           tree_.leafCount * sizeof(WideLeaf) + tree_.groupCount * (sizeof(BoxGroup) + sizeof(OrientedBoxes)) +
            normals_.memoryBytes();
 }
 

@@ -80,7 +80,7 @@ class MeshTree {
     const Mesh& mesh() const { return *mesh_; }
     const WideTree& tree() const { return tree_; }
     /// The oriented boxes of a node's children.
-    const OrientedGroup& group(std::uint32_t node) const { return groups_[node - tree_.leafCount]; }
+    const OrientedBoxes& group(std::uint32_t node) const { return groups_[node - tree_.leafCount]; }
     float voxelSize() const { return voxelSize_; }  ///< [m]
     std::size_t memoryBytes() const;
 
@@ -97,7 +97,7 @@ class MeshTree {
     float voxelSize_;
     double perMetre_;  // voxels per metre
     WideTree tree_;
-    LargeArray<OrientedGroup> groups_;
+    LargeArray<OrientedBoxes> groups_;
     FeatureNormals normals_;
 };
 

@@ -21,8 +21,6 @@ namespace {
 constexpr int orientedLevels = 3;
 /// Margin of boxes for the rounding of vertices to floats [voxels].
 constexpr float roundingRoom = 1e-5f;
-/// Count of passes that diagonalise a 3 x 3 matrix: each pass nearly squares the off-diagonal remainder.
-constexpr int jacobiPasses = 6;
 constexpr std::size_t grain = 16;  // groups per task
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -49,20 +47,6 @@ void forTriangles(const WideLeaf& leaf, const glm::vec3& origin, Visit visit) {
         const float ac = leaf.lengthAC[i];
         visit(a, a + leaf.lengthAB[i] * x, a + ac * (leaf.directionAC[0][i] * x + leaf.directionAC[1][i] * y), z);
     }
-}
-
-// The eigenvectors of a symmetric matrix, as columns.
-glm::mat3 eigenvectors(glm::mat3 m) {
-    glm::mat3 v(1);
-    for (int pass = 0; pass < jacobiPasses; ++pass)
-        for (int p = 0; p < 3; ++p) {
-            const int q = (p + 1) % 3;
-            if (m[p][q] == 0) continue;
-            const glm::mat3 rotation = jacobiRotation(m, p, q);
-            m = glm::transpose(rotation) * m * rotation;
-            v = v * rotation;
-        }
-    return v;
 }
 
 using Boxes = std::array<Box, treeWidth>;
@@ -102,7 +86,7 @@ Boxes boxesOf(const WideTree& tree, const LeafRange& leaves, const glm::vec3& or
 }
 
 // Fills a group with the boxes of its children, oriented or along the axes.
-void fill(const WideTree& tree, const BoxGroup& aligned, const LeafRange& leaves, bool oriented, OrientedGroup& group) {
+void fill(const WideTree& tree, const BoxGroup& aligned, const LeafRange& leaves, bool oriented, OrientedBoxes& group) {
     group.firstChild = aligned.firstChild;
     glm::vec3 origin(0);
     glm::mat3 frame(1);
@@ -129,8 +113,8 @@ void fill(const WideTree& tree, const BoxGroup& aligned, const LeafRange& leaves
 
 }  // namespace
 
-LargeArray<OrientedGroup> makeOrientedGroups(const WideTree& tree) {
-    LargeArray<OrientedGroup> groups(tree.groupCount);
+LargeArray<OrientedBoxes> makeOrientedBoxes(const WideTree& tree) {
+    LargeArray<OrientedBoxes> groups(tree.groupCount);
     std::uint32_t begin = 0, children = tree.leafCount, leavesInChild = 1;
     for (int level = 0; begin < tree.groupCount; ++level) {
         const std::uint32_t count = (children + treeWidth - 1) / treeWidth;

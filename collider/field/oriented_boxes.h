@@ -16,16 +16,16 @@ namespace bilayer::detail {
 
 /// The boxes of eight leaves or eight groups in a common frame [voxels]. Unused boxes are empty and infinitely far
 /// away.
-struct OrientedGroup {
+struct OrientedBoxes {
     alignas(64) float lower[3][treeWidth];
     float upper[3][treeWidth];
     float axes[3][3];          ///< of the frame, in the tree's frame
     float origin[3];           ///< of the frame in the tree's frame; whole voxels
     std::uint32_t firstChild;  ///< the node of the first box; the others follow
 };
-static_assert(sizeof(OrientedGroup) == 256, "four cache lines");
+static_assert(sizeof(OrientedBoxes) == 256, "four cache lines");
 
 /// The groups in the order of the tree's groups; `groupCount` of them.
-LargeArray<OrientedGroup> makeOrientedGroups(const WideTree& tree);
+LargeArray<OrientedBoxes> makeOrientedBoxes(const WideTree& tree);
 
 }  // namespace bilayer::detail

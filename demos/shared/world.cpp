@@ -11,15 +11,10 @@ namespace {
 
 constexpr float gravity = 9.81f;  // [m/s^2]
 
-btTransform toTransform(const Pose& pose) {
-    const auto& [p, q] = pose;
-    return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
-}
-
 // Returns the frame of a shape's mesh in its body.
 btTransform frameOf(const btCollisionShape& shape) {
     const auto* field = dynamic_cast<const bullet::Shape*>(&shape);
-    return field ? toTransform(field->frame()) : btTransform::getIdentity();
+    return field ? toBullet(field->frame()) : btTransform::getIdentity();
 }
 
 }  // namespace
@@ -47,7 +42,7 @@ btRigidBody& World::add(std::shared_ptr<btCollisionShape> shape, const Matter& m
     if (matter.mass > 0) shape->calculateLocalInertia(matter.mass, inertia);
     btRigidBody::btRigidBodyConstructionInfo info(matter.mass, nullptr, shape.get(), inertia);
     // a body's origin is its centre of mass, but a mesh's is arbitrary; the shape's frame converts between the two
-    info.m_startWorldTransform = toTransform(pose) * frameOf(*shape).inverse();
+    info.m_startWorldTransform = toBullet(pose) * frameOf(*shape).inverse();
     info.m_friction = matter.friction;
     info.m_rollingFriction = matter.rollingFriction;
     info.m_restitution = matter.restitution;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A step of C. G. J. Jacobi's method for the eigenvectors of a symmetric matrix.
+// C. G. J. Jacobi's method for the eigenvectors of a symmetric matrix.
 // Tested by tests/collider/mass.cpp through massProperties().
 #pragma once
 
 #include <cmath>
 #include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
 
 namespace bilayer::detail {
 
@@ -18,6 +20,22 @@ glm::mat<3, 3, Real> jacobiRotation(const glm::mat<3, 3, Real>& m, int p, int q)
     rotation[p][p] = rotation[q][q] = 1 / std::sqrt(tangent * tangent + 1);
     rotation[q][p] = tangent * rotation[p][p], rotation[p][q] = -rotation[q][p];
     return rotation;
+}
+
+/// The eigenvectors of a symmetric matrix as columns, in no order, to about the precision of its numbers.
+template <class Real>
+glm::mat<3, 3, Real> eigenvectors(glm::mat<3, 3, Real> m) {
+    constexpr int passes = 6;  // each nearly squares the remainder beside the diagonal
+    glm::mat<3, 3, Real> vectors(1);
+    for (int pass = 0; pass < passes; ++pass)
+        for (int p = 0; p < 3; ++p) {
+            const int q = (p + 1) % 3;
+            if (std::abs(m[p][q]) <= std::numeric_limits<Real>::min()) continue;
+            const glm::mat<3, 3, Real> rotation = jacobiRotation(m, p, q);
+            m = glm::transpose(rotation) * m * rotation;
+            vectors = vectors * rotation;
+        }
+    return vectors;
 }
 
 }  // namespace bilayer::detail

@@ -1,23 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the phases of a build.
+// Measures time in seconds.
 // Tested by tests/sdf/build.cpp through build().
 #pragma once
 
 #include <chrono>
-#include <utility>
 
 namespace bilayer::detail {
 
 class Stopwatch {
   public:
-    /// Returns the seconds since the last call or since construction.
+    /// Returns the seconds since the last lap or since construction.
+    double seconds() const { return since(Clock::now()); }
+    /// The same, and begins a lap.
     double lap() {
-        const auto now = std::chrono::steady_clock::now();
-        return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+        const Clock::time_point now = Clock::now();
+        const double passed = since(now);
+        last_ = now;
+        return passed;
     }
 
   private:
-    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+    using Clock = std::chrono::steady_clock;
+    double since(Clock::time_point now) const { return std::chrono::duration<double>(now - last_).count(); }
+
+    Clock::time_point last_ = Clock::now();
 };
 
 }  // namespace bilayer::detail

@@ -3,8 +3,10 @@
 // Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include <bilayer/sdf/mesh.h>
@@ -18,6 +20,12 @@ inline TriangleCorners cornersOf(const Mesh& mesh, const glm::uvec3& t) {
 }
 inline TriangleCorners cornersOf(const Mesh& mesh, std::uint32_t triangle) {
     return cornersOf(mesh, mesh.triangles[triangle]);
+}
+
+/// The squared length of the longest edge.
+inline double longestEdge2(const TriangleCorners& c) {
+    const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
+    return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
 }
 
 /// Min height of a triangle relative to its longest edge. The projection onto the plane of a flatter one is no better

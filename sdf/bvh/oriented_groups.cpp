@@ -5,7 +5,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
 #include <limits>
 
 #include "sdf/base/jacobi_rotation.h"
@@ -17,8 +16,6 @@ namespace {
 
 constexpr std::size_t levels = 3;        // of groups with oriented boxes
 constexpr std::size_t triangles = 4096;  // per task, about
-/// Each pass of Jacobi's method over the three planes squares the error.
-constexpr int jacobiPasses = 5;
 
 glm::dvec3 cornerOf(const TriangleLeaf& leaf, int corner, std::size_t i) {
     return {leaf.corners[corner][0][i], leaf.corners[corner][1][i], leaf.corners[corner][2][i]};
@@ -27,20 +24,6 @@ glm::dvec3 cornerOf(const TriangleLeaf& leaf, int corner, std::size_t i) {
 glm::dvec3 areaVector(const TriangleLeaf& leaf, std::size_t i) {
     const glm::dvec3 a = cornerOf(leaf, 0, i);
     return glm::cross(cornerOf(leaf, 1, i) - a, cornerOf(leaf, 2, i) - a);
-}
-
-// Returns the eigenvectors of a symmetric matrix as columns.
-glm::dmat3 eigenvectors(glm::dmat3 m) {
-    glm::dmat3 v(1);
-    for (int pass = 0; pass < jacobiPasses; ++pass)
-        for (int p = 0; p < 3; ++p) {
-            const int q = (p + 1) % 3;
-            if (std::abs(m[p][q]) <= std::numeric_limits<double>::min()) continue;
-            const glm::dmat3 rotation = jacobiRotation(m, p, q);
-            m = glm::transpose(rotation) * m * rotation;
-            v = v * rotation;
-        }
-    return v;
 }
 
 // A range of leaves: those of a group, which are consecutive, or those of one child.

@@ -36,19 +36,17 @@ struct Piece {
 /// Cuts triangles into pieces.
 class PieceCutter {
   public:
-    /// @param longestEdge  maximum edge length of a piece [voxels]
-    /// @param pieces       receives the pieces
-    PieceCutter(double longestEdge, std::vector<Piece>& pieces)
-        : longestEdge2_(longestEdge * longestEdge), pieces_(pieces) {}
+    /// @param maxEdge  maximum edge length of a piece [voxels]
+    /// @param pieces   receives the pieces
+    PieceCutter(double maxEdge, std::vector<Piece>& pieces) : maxEdge2_(maxEdge * maxEdge), pieces_(pieces) {}
 
     /// Cuts a triangle by bisecting longest edges, and discards pieces whose box misses the limits. Pieces do not
     /// depend on the limits. The pieces of two triangles meet at the same points of a shared edge.
     void cut(const TriangleCorners& corners, std::uint32_t triangle, const TriangleLimits& limits) {
         const TriangleCorners& c = corners;
-        const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
         // Most triangles of a fine mesh are short. A function call for each would double the cost.
-        if (std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)}) <= longestEdge2_)
-            add(c[0], ab, -ca, triangle);
+        if (longestEdge2(c) <= maxEdge2_)
+            add(c[0], c[1] - c[0], c[2] - c[0], triangle);
         else
             halve(c, triangle, limits);
     }
@@ -90,7 +88,7 @@ class PieceCutter {
         return int(std::int64_t(value + 0.5 + shift) - std::int64_t(shift));
     }
 
-    double longestEdge2_;
+    double maxEdge2_;
     std::vector<Piece>& pieces_;
     WaitingPieces waiting_{};
     int count_ = 0;

@@ -151,11 +151,6 @@ class TileCutter {
   private:
     using Next = void (TileCutter::*)(const TriangleCorners&, double area, double longest2);
 
-    static double longestEdge2(const TriangleCorners& c) {
-        const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
-        return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
-    }
-
     // Algorithm 1. Where it would leave gaps, bisects or quarters the triangle, or emits one row of samples along it.
     void rows(const TriangleCorners& c, double area, double longest2) {
         const double n = std::max(1.0, std::ceil(std::sqrt(area / epsilon_)));

@@ -28,11 +28,6 @@ glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
     return t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
 }
 
-double longestEdge2(const TriangleCorners& c) {
-    const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
-    return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
-}
-
 // Returns the angle that a triangle subtends at one of its points: a full circle in the interior, half of it on an
 // edge.
 double angleAt(const TriangleCorners& c, const glm::dvec3& p) {

@@ -27,7 +27,7 @@ namespace {
 std::vector<double> distances2(const TriangleCorners& one, std::span<const TriangleCorners> others) {
     using D = hn::CappedTag<double, 8>;
     const D tag;
-    const TriangleLanes<D> same(sameInAll(tag, one[0]), sameInAll(tag, one[1]), sameInAll(tag, one[2]));
+    const CornerLanes<D> same(sameInAll(tag, one[0]), sameInAll(tag, one[1]), sameInAll(tag, one[2]));
     std::vector<double> found;
     for (std::size_t i = 0; i < others.size(); i += hn::Lanes(tag)) {
         alignas(64) double lanes[3][3][8], answers[8];
@@ -36,8 +36,7 @@ std::vector<double> distances2(const TriangleCorners& one, std::span<const Trian
             for (std::size_t k = 0; k < 3; ++k)
                 for (int axis = 0; axis < 3; ++axis)
                     lanes[k][axis][lane] = others[i + std::min(lane, used - 1)][k][axis];
-        const TriangleLanes<D> all(loadLanes(tag, lanes[0], 0), loadLanes(tag, lanes[1], 0),
-                                   loadLanes(tag, lanes[2], 0));
+        const CornerLanes<D> all(loadLanes(tag, lanes[0], 0), loadLanes(tag, lanes[1], 0), loadLanes(tag, lanes[2], 0));
         hn::Store(triangleDistance2(tag, same, all), tag, answers);
         found.insert(found.end(), answers, answers + used);
     }

@@ -26,6 +26,8 @@ expect("fluid" "sdf;collider;fluid" ${none})
 expect("cl" "sdf;collider;cl" -DCMAKE_DISABLE_FIND_PACKAGE_Bullet=ON)
 expect("bullet" "sdf;collider;bullet" -DCMAKE_DISABLE_FIND_PACKAGE_OpenCL=ON)
 expect("" "sdf;collider;cl;bullet;fluid")
+expect("sdf OPTIONAL_COMPONENTS bullet cl" "sdf" ${none})
+expect("sdf OPTIONAL_COMPONENTS bullet" "sdf;collider;bullet" -DCMAKE_DISABLE_FIND_PACKAGE_OpenCL=ON)
 # and what is missing is said
 foreach(case IN ITEMS "cl OpenCL" "bullet Bullet" "sfd sfd")
   separate_arguments(case)

@@ -27,6 +27,10 @@ inline btQuaternion toBullet(const glm::quat& q) {
 }
 
 /// A basis that is no rotation gives that of the nearest unit quaternion.
+inline btTransform toBullet(const Pose& pose) {
+    const auto& [p, q] = pose;
+    return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
+}
 inline Pose toPose(const btTransform& t) {
     const glm::quat rotation = toGlm(t.getRotation());
     const bool isUnit = std::abs(glm::dot(rotation, rotation) - 1) < bilayer::detail::unitTolerance;
