@@ -113,29 +113,6 @@ TEST_CASE("far from the origin a liquid is as fine as near it") {
     CHECK(differ == 0);
 }
 
-TEST_CASE("a body and a liquid with origins meet where these put them") {
-    const glm::dvec3 far(5e5, -4e6, 300);
-    Mesh tank = shapes::box(glm::vec3(0.5f)), body = shapes::sphere(0.3f, 4);
-    const auto united = [&] {
-        const LevelSet start = build(tank, {.voxelSize = 0.03125f});
-        const auto liquid = openvdb::gridPtrCast<FloatGrid>(inWorld(start.grids().distance, start));
-        fluid::seed(*liquid, body, {}, fluid::SeedMode::unite);
-        requireLevelSet(*liquid);
-        return liquid;
-    };
-    body.origin = {0, 0, 0.625};
-    const FloatGrid::Ptr near = united();
-    tank.origin = far, body.origin += far;
-    const FloatGrid::Ptr there = united();
-    const openvdb::Vec3d zero = there->indexToWorld(openvdb::Coord(0));
-    CHECK(glm::distance(glm::dvec3(zero.x(), zero.y(), zero.z()), far) < 1e-6);
-    REQUIRE(there->activeVoxelCount() == near->activeVoxelCount());
-    double difference = 0;
-    for (auto voxel = near->cbeginValueOn(); voxel; ++voxel)
-        difference = std::max(difference, double(std::abs(*voxel - there->tree().getValue(voxel.getCoord()))));
-    CHECK(difference < 1e-6);
-}
-
 TEST_CASE("the band is complete: every voxel nearer than the half width is active") {
     const float halfWidth = GENERATE(3.0f, 5.0f);
     const auto liquid = emptyLiquid(0.04f, halfWidth);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A liquid that starts as a stored level set.
-// Tested by tests/tools/seed.cpp and tests/python/test_fluid.py.
 #pragma once
 
 #include <openvdb/openvdb.h>
