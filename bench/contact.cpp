@@ -29,12 +29,12 @@ using demo::writeSvg;
 
 namespace {
 
-constexpr float knotSize = 0.2f;   // [m]
-constexpr float room = 1;          // between bodies at the start [diagonal of their box]
-constexpr int smallestPile = 20;   // bodies for a pen of two by two knots; its edge grows with the count
-constexpr float wall = 0.1f;       // half of a wall's thickness [knots]
-constexpr float penHeight = 5;     // [knots], for each knot along the floor
-constexpr double measured = 0.02;  // distance of the points at which penetration is measured [size of a body]
+constexpr float knotSize = 0.2f;        // [m]
+constexpr float spacing = 1;            // between bodies at the start [diagonal of their box]
+constexpr int minPile = 20;             // bodies for a pen of two by two knots; its edge grows with the count
+constexpr float wall = 0.1f;            // half of a wall's thickness [knots]
+constexpr float penHeight = 5;          // [knots], for each knot along the floor
+constexpr double sampleSpacing = 0.02;  // distance of the points at which penetration is measured [size of a body]
 constexpr float bowlRadius = 0.5f, bowlWall = 0.05f;  // [m]
 constexpr float bowlVoxels = 128, boxEdge = 0.1f;     // along the bowl; [m]
 constexpr int bowlCells = 32, boxesInBowl = 60;
@@ -73,7 +73,7 @@ glm::quat anyRotation(std::mt19937& random) {
 // Adds layers of `along` by `along` bodies, each with a random rotation.
 void addLayers(std::vector<Member>& members, const Form& form, float mass, int bodies, int along, float lowest) {
     std::mt19937 random(7);
-    const float step = room * glm::length(form.box.size());
+    const float step = spacing * glm::length(form.box.size());
     for (int i = 0; i < bodies; ++i) {
         const int layer = i / (along * along), place = i % (along * along);
         const auto at = [&](int k) { return step * (float(k) - 0.5f * float(along - 1)); };
@@ -86,7 +86,7 @@ void addLayers(std::vector<Member>& members, const Form& form, float mass, int b
 struct BoxForm {
     explicit BoxForm(const glm::vec3& halfExtents)
         : shape(btVector3(halfExtents.x, halfExtents.y, halfExtents.z)),
-          form(shapes::box(halfExtents), shape, measured * double(knotSize)) {}
+          form(shapes::box(halfExtents), shape, sampleSpacing * double(knotSize)) {}
     btBoxShape shape;
     Form form;
 };
@@ -94,9 +94,9 @@ struct BoxForm {
 // Knots in a pen of Bullet's boxes.
 class Knots {
   public:
-    Knots(const Mesh& mesh, Rival& rival, int bodies) : knot_(mesh, rival.shape(), measured * double(knotSize)) {
-        const int along = std::max(2, int(std::lround(2 * std::cbrt(float(bodies) / smallestPile))));
-        const float thick = wall * knotSize, inside = 0.5f * room * glm::length(knot_.box.size()) * float(along),
+    Knots(const Mesh& mesh, Rival& rival, int bodies) : knot_(mesh, rival.shape(), sampleSpacing * double(knotSize)) {
+        const int along = std::max(2, int(std::lround(2 * std::cbrt(float(bodies) / minPile))));
+        const float thick = wall * knotSize, inside = 0.5f * spacing * glm::length(knot_.box.size()) * float(along),
                     out = inside + thick, halfHeight = 0.5f * penHeight * knotSize * float(along);
         addWall({0, 0, -thick}, {out + thick, out + thick, thick});
         for (const float side : {-1.f, 1.f}) {
@@ -120,7 +120,7 @@ class Knots {
 class Boxes {
   public:
     Boxes(const Mesh& bowl, Rival& rival)
-        : bowl_(bowl, rival.shape(), measured * double(boxEdge)), box_(glm::vec3(boxEdge / 2)) {
+        : bowl_(bowl, rival.shape(), sampleSpacing * double(boxEdge)), box_(glm::vec3(boxEdge / 2)) {
         members.push_back({&bowl_});
         addLayers(members, box_.form, 1, boxesInBowl, 4, -0.5f * bowlRadius);
     }
@@ -157,7 +157,7 @@ void printTable(const std::string& title, const std::vector<Row>& rows) {
         fmt::print("| {} | {:.2f} | {:.1f} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {:.2f} | {:.1e} | {} |\n", row.name,
                    row.made, row.run.simulated, row.step(), row.step() / rows.front().step(),
                    demo::percentile(row.run.stepMs, 0.99), row.penetration(0.99), row.penetration(1), row.restEnergy(),
-                   row.run.restless);
+                   row.run.awakeBodies);
     std::fflush(stdout);
 }
 
@@ -334,7 +334,7 @@ nlohmann::json jsonOf(const std::vector<Row>& rows) {
                        {"stepMs", row.run.stepMs},
                        {"kineticEnergy", row.run.kineticEnergy},
                        {"penetrations", row.run.penetrations},
-                       {"restless", row.run.restless}});
+                       {"restless", row.run.awakeBodies}});
     return all;
 }
 
@@ -357,7 +357,7 @@ int run(int argc, char** argv) {
     app.add_option("--steps-per-second", options.pile.stepsPerSecond, "steps per second")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
-    app.add_option("--patience", options.pile.patience, "maximum wall-clock time of a run [s]")->capture_default_str();
+    app.add_option("--patience", options.pile.timeLimit, "maximum wall-clock time of a run [s]")->capture_default_str();
     app.add_option("--grow-bodies", options.growBodies, "counts of knots to try; 0: none")->capture_default_str();
     app.add_option("--grow-voxels", options.growVoxels, "voxels along a knot to try; 0: none")->capture_default_str();
     app.add_flag("--on-device", options.onDevice,

@@ -69,7 +69,7 @@ class Arena {
         return sum;
     }
 
-    int restless() const {
+    int awakeBodies() const {
         return int(std::count_if(bodies_.begin(), bodies_.end(), [](const auto& body) {
             return !(body->getLinearVelocity().length() < restingSpeed) ||
                    !(body->getAngularVelocity().length() < restingSpin);
@@ -129,7 +129,7 @@ PileRun play(const Rival& rival, const std::vector<Member>& members, const PileO
     PileRun run;
     std::vector<std::vector<Pose>> frames;
     const Stopwatch since;
-    for (int i = 1; i <= steps && since.seconds() < options.patience; ++i) {
+    for (int i = 1; i <= steps && since.seconds() < options.timeLimit; ++i) {
         const Stopwatch watch;
         arena.step(1 / options.stepsPerSecond);
         run.stepMs.push_back(1e3 * watch.seconds());
@@ -137,7 +137,7 @@ PileRun play(const Rival& rival, const std::vector<Member>& members, const PileO
         if (i % between == 0) frames.push_back(arena.poses());
     }
     run.simulated = double(run.stepMs.size()) / double(options.stepsPerSecond);
-    run.restless = arena.restless();
+    run.awakeBodies = arena.awakeBodies();
     std::vector<std::vector<double>> depths(frames.size());
     tbb::parallel_for(std::size_t(0), frames.size(),
                       [&](std::size_t i) { depths[i] = penetrationsIn(members, frames[i]); });

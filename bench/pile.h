@@ -33,7 +33,7 @@ struct Member {
 struct PileOptions {
     float stepsPerSecond = 240;
     double seconds = 4;
-    double patience = 60;  ///< limit of wall-clock time; ends a run that takes longer [s]
+    double timeLimit = 60;  ///< maximum wall-clock time of a run, which then ends [s]
     int measuredFrames = 40;
 };
 
@@ -42,7 +42,7 @@ struct PileRun {
     std::vector<double> stepMs;         ///< time of each step [ms]
     std::vector<double> kineticEnergy;  ///< after each step [J]
     std::vector<double> penetrations;   ///< overlapping pairs in the measured frames, by the meshes [m]
-    int restless = 0;                   ///< bodies at the end that are too fast to fall asleep
+    int awakeBodies = 0;                ///< bodies at the end that are too fast to fall asleep
     double simulated = 0;               ///< [s]
 };
 

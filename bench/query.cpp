@@ -141,7 +141,7 @@ void requireAlike(const std::vector<RayCaster>& peers, const Questions<Ray>& que
     }
 }
 
-// What one contest belongs to.
+// Labels of one comparison.
 struct Subject {
     std::string name;
     float voxelSize;  // [m]

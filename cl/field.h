@@ -30,9 +30,9 @@ class DeviceField {
 
     /// Builds the field of a mesh on the device, where it stays. Only the mesh is uploaded, and only counts are
     /// downloaded. Samples equal those of build(mesh, build, openclFiller(device, options)), with one exception: where
-    /// the double layer method's signs are contradictory, as on an inverted mesh, empty space may be on the other side.
-    /// The peak memory is about 1.7 times that of the field, and a quarter of the options' limit for the fill. The
-    /// nearest triangles are not kept.
+    /// the double layer method's signs are contradictory, as on an inverted mesh, regions outside the band may have the
+    /// other sign. The peak memory is about 1.7 times that of the field, and a quarter of the options' limit for the
+    /// fill. The nearest triangles are not kept.
     ///
     /// Throws what build() throws. Throws std::invalid_argument for builds that need the processor: a method other than
     /// Method::exact and Method::doubleLayer, and signs other than from normals, also where those are contradictory.

@@ -83,7 +83,7 @@ struct ImpactOptions {
     /// twentieth of the smaller voxel.
     float tolerance = 0;
     /// Finds the first penetration instead of the first touch. Bodies may start in contact, and rest, slide and roll on
-    /// each other; what they do deeper than contacts handle is found. The tolerance has no effect.
+    /// each other; only penetration deeper than contacts handle is found. The tolerance has no effect.
     bool penetration = false;
 };
 
@@ -99,9 +99,10 @@ struct Impact {
 /// When two bodies touch that move from their poses by their motions. Both motions take the same time; positions change
 /// at constant velocities, and rotations about the pose positions at constant angular velocities.
 ///
-/// The bodies do not touch before, whatever their speed and however thin they are. They may touch later than found by
-/// what they need to come closer by the tolerance, and may just miss each other by it. Bodies that are as near as the
-/// tolerance at the start, or overlap, touch at the start, in whatever direction they move.
+/// The bodies do not touch before, whatever their speed and however thin they are. The fraction found may be
+/// early by what they need to approach by the tolerance: bodies that pass each other within it count as touching.
+/// Bodies that are as near as the tolerance at the start, or overlap, touch at the start, in whatever direction they
+/// move.
 ///
 /// By conservative advancement (B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", 1996): no point
 /// approaches faster than the bodies' velocities and the rotations at their radii allow. Takes a distance() for each

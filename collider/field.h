@@ -74,7 +74,7 @@ class Field {
     ///   where the side changes between two voxels without a surface.
     /// - Elsewhere, in a closed mesh signed by normals or winding numbers, it is that of the mesh's winding number. In
     ///   one signed by normals, the normal at the closest feature decides where the sample agrees with it, and within a
-    ///   tenth of a voxel of the surface. That errs only where the surface meets itself within a voxel.
+    ///   tenth of a voxel of the surface. That errs only where the surface comes within a voxel of itself.
     /// - Elsewhere, in other meshes, the normal decides if the field confirms that the wall separates inside from
     ///   outside; otherwise the sample.
     /// - Any one of the features that are equally close within the tolerance is returned. At an edge or vertex itself,

@@ -22,8 +22,8 @@ struct MassProperties {
 /// Exact integrals over the tetrahedra between the triangles and the centre of the bounds, in double precision (D.
 /// Eberly, "Polyhedral Mass Properties (Revisited)", 2002). The mesh should be closed. Where its solids overlap,
 /// each of them counts. An inside-out mesh gives the same result as its reverse. Throws std::invalid_argument if the
-/// volume is zero, as for an open surface, or if the inertia is not positive. The same for an inertia beyond single
-/// precision: that of a body of 1e8 m.
+/// volume is zero, as for an open surface, if the inertia is not positive, or if it exceeds single precision, as that
+/// of a body of 1e8 m does.
 MassProperties massProperties(const Mesh& mesh);
 
 /// Integrals over the negative region of the interpolated field. The same bytes for any number of threads.

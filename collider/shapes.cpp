@@ -94,7 +94,7 @@ ContactShape ContactShape::plane(const glm::vec3& normal, float offset) {
 }
 
 ContactShape ContactShape::triangles(TriangleSheet sheet) {
-    if (!sheet.visit) throw std::invalid_argument("the sheet of triangles has no function 'visit'");
+    if (!sheet.visit) throw std::invalid_argument("TriangleSheet::visit is empty; it must pass the triangles in a box");
     return ContactShape(ContactShapeData{std::move(sheet)});
 }
 

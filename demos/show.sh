@@ -18,7 +18,7 @@ for ((i = 1; i <= $#; ++i)); do
 done
 
 start=$(mktemp)
-profile=$(mktemp -d) # of its own, so that the browser starts beside one that is open already
+profile=$(mktemp -d) # of its own, so that the browser starts although another one is open
 trap 'rm -rf "$profile" "$start"' EXIT
 status=0
 "$program" "$@" || status=$?

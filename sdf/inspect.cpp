@@ -191,7 +191,7 @@ std::size_t countInsideOut(const Mesh& mesh, const TriangleTree& tree, std::vect
 // Returns whether orient() has nothing to flip. This holds if every edge has two triangles with opposite directions,
 // every vertex has one fan, and all components have clearly positive volume. A flip requires a component of negative
 // volume.
-bool needsNoTurning(const MeshReport& report, const std::vector<Component>& all) {
+bool isKnownToBeOriented(const MeshReport& report, const std::vector<Component>& all) {
     return report.closed() && report.misorientedEdges == 0 && report.nonManifoldVertices == 0 &&
            std::all_of(all.begin(), all.end(), [&](const Component& component) {
                return component.volume > clearVolume * std::pow(report.area, 1.5);
@@ -283,7 +283,7 @@ MeshReport inspect(const Mesh& input, float wall, const std::function<bool(float
     progress.advance();
     report.selfIntersections = countIntersectingPairs(mesh, topology, tree, &progress);
     progress.advance();
-    if (!needsNoTurning(report, all)) report.flippedTriangles = orient(mesh, &progress).flippedTriangles;
+    if (!isKnownToBeOriented(report, all)) report.flippedTriangles = orient(mesh, &progress).flippedTriangles;
     progress.advance();
     findThinWalls(tree, measures, wall, report, progress);
     progress.finish();
@@ -292,7 +292,7 @@ MeshReport inspect(const Mesh& input, float wall, const std::function<bool(float
 
 std::string verdict(const MeshReport& report) {
     if (report.triangles == 0 || report.triangles == report.degenerateTriangles) return "no triangle has an area";
-    std::string text = !report.closed()    ? (report.boundaryEdges ? "open" : "closed, but not everywhere a surface")
+    std::string text = !report.closed()    ? (report.boundaryEdges ? "open" : "closed, but non-manifold")
                        : report.oriented() ? "closed and oriented"
                                            : "closed, but not oriented";
     const char* separator = ": ";

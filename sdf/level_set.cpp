@@ -24,7 +24,7 @@ namespace {
 /// Maximum distance of voxel (0, 0, 0) from the origin [voxels]: floats cannot separate voxels farther away.
 constexpr double maxOrigin = double(std::uint64_t(1) << 40);
 /// Maximum band width [voxels]: a wider band is treated as file damage.
-constexpr float maxBandWidth = 1 << 23;
+constexpr float maxBandWidthVoxels = 1 << 23;
 /// Tolerance of an error bound, which was rounded when it was multiplied by the voxel size.
 constexpr float rounding = 1e-5f;
 /// The empty name is for fields from other programs.
@@ -51,8 +51,8 @@ void require(bool holds, const openvdb::GridBase& grid, const char* entry, const
 }
 
 void requireWidth(const openvdb::GridBase& grid, const char* entry, float width) {
-    require(width > 0 && std::isnormal(width) && double(width) <= double(maxBandWidth) * grid.voxelSize()[0], grid,
-            entry, width, "above 0 and at most 2^23 voxels");
+    require(width > 0 && std::isnormal(width) && double(width) <= double(maxBandWidthVoxels) * grid.voxelSize()[0],
+            grid, entry, width, "above 0 and at most 2^23 voxels");
 }
 
 std::string requireName(const openvdb::GridBase& grid, const char* entry, const auto& names) {

@@ -128,7 +128,7 @@ void convertAll(BatchArguments& a) {
     if (result.signal) return endBy(result.signal);
     if (!a.json) printResult(plan, result, watch.seconds());
     if (result.counts.failed)
-        throw std::runtime_error(fmt::format("{} of {} meshes failed, the first of them {} ({} has all)",
+        throw std::runtime_error(fmt::format("{} of {} meshes failed, the first of them {} (see {} for all failures)",
                                              result.counts.failed, result.counts.total, result.firstFailure,
                                              plan.folder.records().string()));
 }
@@ -152,9 +152,12 @@ void addSources(CLI::App& command, BatchArguments& a) {
 }
 
 void addLimits(CLI::App& command, BatchArguments& a) {
-    command.add_option("--time-limit", a.timeLimit, "end a mesh after this time [s]")->check(within(1e-3, 1e6));
+    command.add_option("--time-limit", a.timeLimit, "stop the conversion of a mesh after this time [s]")
+        ->check(within(1e-3, 1e6));
     const CLI::Range mebibytes(std::uint64_t(1), std::uint64_t(1) << 30);
-    command.add_option("--memory-limit", a.memoryLimit, "end a mesh that allocates more memory than this [MiB]")
+    command
+        .add_option("--memory-limit", a.memoryLimit,
+                    "stop the conversion of a mesh that allocates more memory than this [MiB]")
         ->check(mebibytes);
     command
         .add_option("--large-memory", a.largeMemory,

@@ -32,14 +32,14 @@ namespace {
 // The words are part of the command line's contract.
 const std::map<std::string, Method> methods(methodNames.begin(), methodNames.end());
 const std::map<std::string, Sign> signs(signNames.begin(), signNames.end());
-const std::map<std::string, ContactAccuracy> measures{
+const std::map<std::string, ContactAccuracy> contactAccuracies{
     {nameOf(ContactAccuracy::samples), ContactAccuracy::samples},
     {nameOf(ContactAccuracy::exactNearFeatures), ContactAccuracy::exactNearFeatures},
     {nameOf(ContactAccuracy::exact), ContactAccuracy::exact}};
 const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::automatic},
                                                     {"block", KernelMapping::blockPerItem},
                                                     {"group", KernelMapping::groupPerBlock}};
-constexpr double thinnestBand = 1e-3, widestBand = 1e3;  // [voxels]
+constexpr double minBandVoxels = 1e-3, maxBandVoxels = 1e3;
 
 void requireUsage(const BuildArguments& a) {
     if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count() || a.mappingGiven->count()))
@@ -69,12 +69,12 @@ void requireUsage(const BuildArguments& a) {
 void requireWidth(const CLI::Option* option, float width, const BuildArguments& a) {
     const bool world = a.isBandInWorldUnits();
     const double voxels = double(width) / (world ? double(a.options.voxelSize) : 1);
-    if (option->count() && !(voxels >= thinnestBand && voxels <= widestBand))
+    if (option->count() && !(voxels >= minBandVoxels && voxels <= maxBandVoxels))
         throw CLI::ValidationError(
             option->get_name(),
             fmt::format("{:g}{} must be {:g} to {:g} voxels", width,
                         world ? fmt::format(" is {:g} voxels of {:g}; it", voxels, a.options.voxelSize) : "",
-                        thinnestBand, widestBand));
+                        minBandVoxels, maxBandVoxels));
 }
 
 void requireBand(const BuildArguments& a) {
@@ -117,7 +117,7 @@ LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const BuildArguments
 }
 
 CLI::Option_group* addBand(CLI::App& command, BuildArguments& a) {
-    auto* size = command.add_option_group("voxel size", "exactly one of");
+    auto* size = command.add_option_group("voxel size", "one of these options gives it");
     size->add_option("--voxel-size", a.options.voxelSize, "edge of a voxel in the mesh's unit")->check(positive());
     a.resolutionGiven = size->add_option("--resolution", a.resolution, "voxels along the longest side of the bounds")
                             ->check(positive());
@@ -133,7 +133,7 @@ CLI::Option_group* addBand(CLI::App& command, BuildArguments& a) {
     a.interiorGiven->needs(a.exteriorGiven)->excludes(a.halfGiven);
     command
         .add_option("--band-unit", a.bandUnit,
-                    "unit of the three widths: voxels (default) or world, the mesh's unit; both 0.001 to 1000 voxels")
+                    "unit of the three widths: voxels (default) or world, the mesh's unit; each 0.001 to 1000 voxels")
         ->check(CLI::IsMember({"voxels", "world"}));
     return size;
 }
@@ -175,7 +175,7 @@ void addBody(CLI::App& command, BuildArguments& a) {
         group
             ->add_option("--contacts", a.contacts,
                          "contact accuracy: samples alone, exact triangles near edges (default), or everywhere")
-            ->check(CLI::IsMember(measures));
+            ->check(CLI::IsMember(contactAccuracies));
     auto* noMesh =
         group->add_flag("--no-mesh", a.noMesh, "store no mesh: the file is smaller, and sharp edges are rounded");
     a.bodyOptions = {
@@ -210,7 +210,7 @@ void checkBuildOptions(BuildArguments& a) {
     requireUsage(a);
     // widths in the mesh's unit are checked once the voxel size is known
     if (!a.isBandInWorldUnits() || !a.resolutionGiven->count()) requireBand(a);
-    a.collider.accuracy = a.noMesh ? ContactAccuracy::samples : measures.at(a.contacts);
+    a.collider.accuracy = a.noMesh ? ContactAccuracy::samples : contactAccuracies.at(a.contacts);
 }
 
 void setSizes(BuildArguments& a, const Mesh& mesh) {

@@ -242,11 +242,13 @@ void addSeed(CLI::App& app) {
     command->add_option("--half-width", a->halfWidth, "width of the liquid's band [voxels], default 3")
         ->check(within(3, 1e3))
         ->excludes(into);
-    command->add_option("--translate", a->translate, "translates all inputs: x y z")->expected(3)->check(finite());
-    command->add_option("--rotate", a->rotate, "rotates all inputs first: axis x y z and angle [radians]")
+    command->add_option("--translate", a->translate, "translates all inputs, after --rotate: x y z")
+        ->expected(3)
+        ->check(finite());
+    command->add_option("--rotate", a->rotate, "rotates all inputs, after --scale: axis x y z and angle [radians]")
         ->expected(4)
         ->check(finite());
-    command->add_option("--scale", a->scale, "scales all inputs before that: one number, or x y z")
+    command->add_option("--scale", a->scale, "scales all inputs, first of all: one number, or x y z")
         ->expected(1, 3)
         ->check(positive());
     command->add_option("--mode", a->mode, "unite (default), intersect or subtract")

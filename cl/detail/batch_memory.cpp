@@ -26,12 +26,12 @@ ResultLayout::ResultLayout(std::uint64_t blocks, bool withTriangles) {
 void BatchBuffers::allocate(DeviceMemory& memory, const BatchSize& size, const PartBytes& bytes, bool withTriangles) {
     capacity = size;
     const auto buffer = [&](std::uint64_t bytesOf) { return memory.allocate(bytesOf, "a batch of bricks"); };
-    for (const auto& [part, each] : {std::pair{&parts, bytes.part},
+    for (const auto& [part, each] : {std::pair{&parts, bytes.piece},
                                      {&unsorted, bytes.unsorted},
                                      {&sorted, bytes.sorted},
                                      {&cells, bytes.cell},
                                      {&columns, bytes.columns},
-                                     {&begins, bytes.begin}})
+                                     {&begins, bytes.groupBegin}})
         if (each > 0) *part = buffer(size.slots * each);
     ofBricks = buffer(size.bricks * bytes.brick);
     const ResultLayout layout(size.blocks, withTriangles);
@@ -58,7 +58,7 @@ std::uint64_t totalBytes(const BatchSize& size, const PartBytes& bytes, bool wit
 }
 
 std::uint64_t largestBuffer(const BatchSize& size, const PartBytes& bytes, bool withTriangles) {
-    return std::max(ResultLayout(size.blocks, withTriangles).end, size.slots * std::max(bytes.part, bytes.columns));
+    return std::max(ResultLayout(size.blocks, withTriangles).end, size.slots * std::max(bytes.piece, bytes.columns));
 }
 
 }  // namespace bilayer::detail

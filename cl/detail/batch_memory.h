@@ -16,15 +16,15 @@ struct BatchCounts {
 
 /// Memory that the kernels of a method need [bytes].
 struct PartBytes {
-    std::uint64_t part = 0;      ///< of a part of a triangle: Piece of pieces.cl
-    std::uint64_t unsorted = 0;  ///< of a part: Member of groups.cl, a sample of samples.cl
-    std::uint64_t sorted = 0;    ///< of a part: Member again
-    std::uint64_t cell = 0;      ///< of a part: its cell
-    std::uint64_t columns = 0;   ///< of a part: columns of numbers, for a group at most as large or for a sample
-    std::uint64_t begin = 0;     ///< of a part: the first member of a group
-    std::uint64_t brick = 0;     ///< of a brick: the groups of each slice of blocks, or the first samples of its cells
+    std::uint64_t piece = 0;       ///< of a part of a triangle: Piece of pieces.cl
+    std::uint64_t unsorted = 0;    ///< of a part: Member of groups.cl, a sample of samples.cl
+    std::uint64_t sorted = 0;      ///< of a part: Member again
+    std::uint64_t cell = 0;        ///< of a part: its cell
+    std::uint64_t columns = 0;     ///< of a part: columns of numbers, for a group at most as large or for a sample
+    std::uint64_t groupBegin = 0;  ///< of a part: the first member of a group
+    std::uint64_t brick = 0;  ///< of a brick: the groups of each slice of blocks, or the first samples of its cells
 
-    std::uint64_t perPart() const { return part + unsorted + sorted + cell + columns + begin; }
+    std::uint64_t perPart() const { return piece + unsorted + sorted + cell + columns + groupBegin; }
 };
 
 /// The size of a batch of bricks, or the capacity of its buffers.

@@ -20,7 +20,7 @@ constexpr std::uint64_t partsInBatch = 1 << 27, partsForProcessor = 60000;
 
 BatchPlan::BatchPlan(const DeviceInfo& device, const DeviceBins& bins, const DeviceMemory& memory,
                      const PartBytes& bytes, const BatchMode& mode)
-    : device_(device), bins_(bins), bytes_(bytes), mode_(mode), share_(memory.left() / batchesInFlight) {
+    : device_(device), bins_(bins), bytes_(bytes), mode_(mode), share_(memory.freeBytes() / batchesInFlight) {
     for (std::size_t first = 0, last; first < bins_.bricks(); first = last) {
         last = lastFitting(first, memory);
         ranges_.push_back({first, last});

@@ -40,7 +40,7 @@ namespace {
 constexpr std::size_t blocksPerTask = 16;  // blocks that the host receives at once
 constexpr std::uint64_t scratchPart = 8;   // maximum fraction of the budget: 1 / scratchPart
 /// The smallest cells for grouping pieces, and the maximum distance of a brick's samples beyond its reach [voxels].
-constexpr float smallestCell = 1.1f, aroundBrick = 3;
+constexpr float minCellSide = 1.1f, aroundBrick = 3;
 /// Sizes in the kernels [bytes]: Piece of pieces.cl, Member and the columns of Groups in groups.cl, and the columns of
 /// a sample in samples.cl, with its cell and without.
 constexpr std::uint64_t pieceBytes = 112, memberBytes = 32, groupBytes = 32, unsortedSampleBytes = 32, sampleBytes = 28;
@@ -173,12 +173,12 @@ BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const Fil
                   .brick = sampleCells(bins_->grid()) * sizeof(cl_uint)};
     } else {
         const auto slices = std::uint64_t(bins_->grid().blocksPerSide());
-        bytes_ = {.part = pieceBytes,
+        bytes_ = {.piece = pieceBytes,
                   .unsorted = memberBytes,
                   .sorted = memberBytes,
                   .cell = sizeof(cl_uint),
                   .columns = groupBytes,
-                  .begin = sizeof(cl_uint),
+                  .groupBegin = sizeof(cl_uint),
                   .brick = slices * sizeof(cl_uint2)};
         makeScratch();
     }
@@ -188,11 +188,11 @@ BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const Fil
 // Allocates the cells that each group sorts the pieces of a brick by.
 void BrickFill::makeScratch() {
     const float side = float(1 << bins_->grid().shift) + 2 * (float(bins_->grid().margin) + aroundBrick);
-    const std::size_t cells = std::size_t(side / smallestCell) + 2;
+    const std::size_t cells = std::size_t(side / minCellSide) + 2;
     scratchCells_ = cl_uint(std::min<std::size_t>(cells * cells * cells, 1 << 20));
     const std::uint64_t bytes = std::uint64_t(scratchCells_) * sizeof(cl_uint);
     const std::size_t wanted = std::max(1u, device_.info.computeUnits) * groupsPerUnit;
-    scratchGroups_ = std::clamp<std::size_t>(memory_.left() / batchesInFlight / scratchPart / bytes, 1, wanted);
+    scratchGroups_ = std::clamp<std::size_t>(memory_.freeBytes() / batchesInFlight / scratchPart / bytes, 1, wanted);
     for (BrickBatch& batch : batches_)
         batch.scratch = memory_.allocate(scratchGroups_ * bytes, "grouping the triangles of a brick");
 }

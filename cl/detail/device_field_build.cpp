@@ -248,7 +248,8 @@ void DeviceFieldBuilder::computeClearances() {
 
 void checkJob(const FillJob& job) {
     if (job.options.method == Method::prism)
-        throw std::invalid_argument("a field of the method prism cannot stay on the device: upload its level set");
+        throw std::invalid_argument(
+            "a DeviceField cannot be built by the method prism: build a level set and upload that");
     if (!job.mesh.sign)
         throw std::invalid_argument(
             "a field that stays on the device takes its signs from normals; those of this mesh contradict each other, "

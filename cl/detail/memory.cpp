@@ -90,7 +90,7 @@ cl::Buffer DeviceMemory::upload(const void* data, std::uint64_t bytes, const std
 }
 
 void DeviceMemory::count(std::uint64_t bytes, const std::string& purpose) {
-    if (bytes > left() || bytes > device_.info.maxAllocationBytes) refuse(bytes, purpose);
+    if (bytes > freeBytes() || bytes > device_.info.maxAllocationBytes) refuse(bytes, purpose);
     used_ += bytes;
     peak_ = std::max(peak_, used_);
 }

@@ -42,7 +42,7 @@ class DeviceMemory {
     [[noreturn]] void refuse(std::uint64_t bytes, const std::string& purpose) const;
 
     std::uint64_t used() const { return used_; }  ///< bytes
-    std::uint64_t left() const { return budget_ - used_; }
+    std::uint64_t freeBytes() const { return budget_ - used_; }
     std::uint64_t peak() const { return peak_; }  ///< maximum bytes in use at once
 
   private:

@@ -112,7 +112,7 @@ PrismFill::PrismFill(DeviceImpl& device, const OpenclOptions& options, const Pri
       groups_(wantsGroups(device, options.mapping)),
       timing_(options.profile),
       memory_(device, memoryBudget(device, options.memoryMiB)),
-      share_(memory_.left() / batchesInFlight),
+      share_(memory_.freeBytes() / batchesInFlight),
       kernel_(buildProgram(device, prism_cl, commonBuildOptions(device, groups_, mesh.triangles)), "fillBlocks"),
       uploads_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE),
       fillGuard_(device.queue),

@@ -96,7 +96,7 @@ void storeGroup(const Groups* groups, uint index, float3 position, float radius,
     column[THICKNESS * stride] = thickness;
 }
 
-// Sorts members by cell into `sorted`. The members of each non-empty cell form a group. Returns the number of groups.
+// Sorts members by cell into `sorted`. The members of each non-empty cell form a group. Returns the group count.
 uint sortMembers(const Groups* groups, uint first, global const Member* unsorted, global Member* sorted,
                  global uint* cellOfMember, uint count, const Cells* cells, global uint* cursors, SHARED uint2* sums) {
     const uint cellCount = (uint)(cells->size[0] * cells->size[1] * cells->size[2]);
@@ -198,8 +198,8 @@ IntLanes reaching(const BlockGroups* nearby, uint c) {
            (fabs(dx * nx + dy * ny + dz * nz) < slab + halfBlock * (fabs(nx) + fabs(ny) + fabs(nz)));
 }
 
-// Lists groups that reach the block, from the c-th on, until the page may be full or there are no more. Returns the
-// next group to test.
+// Lists groups that reach the block, from the c-th on, until the page may lack space for more or there are none.
+// Returns the next group to test.
 uint fillPage(const BlockGroups* nearby, uint c, SHARED uint* page, SHARED uint* count) {
     BARRIER;
     if (ITEM == 0) *count = 0;

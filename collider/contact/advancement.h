@@ -10,8 +10,8 @@
 
 namespace bilayer::detail {
 
-/// The first place on a path that is as near to an obstacle as a tolerance. Each step goes as far as nothing can be
-/// met. Nothing if the whole path stays clear.
+/// The first place on a path that is as near to an obstacle as a tolerance. Each step travels the clearance but
+/// for the part `left`. Nothing if the whole path stays clear.
 /// @param length       of the path
 /// @param left         part of the clearance that a step leaves, at most the tolerance
 /// @param maxSteps     a path that takes more of them counts as near where they end

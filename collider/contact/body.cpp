@@ -45,7 +45,7 @@ constexpr const char* inertia = "bilayer:inertia";            // xx yy zz, densi
 constexpr const char* products = "bilayer:inertia_products";  // xy xz yz
 constexpr const char* principal = "bilayer:principal_inertia";
 constexpr const char* axes = "bilayer:principal_axes";  // a quaternion, x y z w
-constexpr const char* measure = "bilayer:measure";
+constexpr const char* accuracy = "bilayer:measure";
 }  // namespace entry
 
 std::string text(const glm::vec3& v) {
@@ -183,7 +183,8 @@ constexpr std::pair<ContactAccuracy, const char*> accuracyNames[] = {{ContactAcc
 ContactAccuracy accuracyOf(const std::string& name) {
     for (const auto& [accuracy, itsName] : accuracyNames)
         if (name == itsName) return accuracy;
-    refuseBody(fmt::format("'{}' is {}, and must be samples, edges or triangles", entry::measure, quotedWord(name)));
+    refuseBody(fmt::format("the contact accuracy '{}' is {}; it must be samples, edges or triangles", entry::accuracy,
+                           quotedWord(name)));
 }
 
 // Detects a field that was moved or scaled by another program, without its body.
@@ -225,7 +226,7 @@ LevelSet withBody(const LevelSet& given, const Body& body) {
     openvdb::initialize();
     const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
     for (const char* stale : {entry::volume, entry::centre, entry::inertia, entry::products, entry::principal,
-                              entry::axes, meshEntry, entry::measure})
+                              entry::axes, meshEntry, entry::accuracy})
         distance->removeMeta(stale);
     distance->insertMeta(entry::format, openvdb::Int32Metadata(format));
     distance->insertMeta(entry::margin, openvdb::FloatMetadata(body.margin));
@@ -234,7 +235,7 @@ LevelSet withBody(const LevelSet& given, const Body& body) {
     if (body.mass) storeMass(*distance, *body.mass);
     if (body.mesh) {
         distance->insertMeta(meshEntry, *packMesh(*body.mesh));
-        distance->insertMeta(entry::measure, openvdb::StringMetadata(nameOf(body.accuracy)));
+        distance->insertMeta(entry::accuracy, openvdb::StringMetadata(nameOf(body.accuracy)));
     }
     auto grids = std::make_shared<Grids>(levelSet.grids());
     grids->distance = distance;
@@ -250,8 +251,8 @@ Body bodyOf(const LevelSet& levelSet) {
             "the field has no body stored with it: store one by `bilayer build --body`, withBody() in C++, or "
             "with_body() in Python");
     if (*kind != format)
-        throw std::invalid_argument(
-            fmt::format("the body is of kind {} ('{}'), which only another version knows", *kind, entry::format));
+        throw std::invalid_argument(fmt::format("the stored body has format {} ('{}'); this version reads format {}",
+                                                *kind, entry::format, format));
     Body body;
     body.margin = entries.get<float>(entry::margin);
     body.bounds.lower = entries.vector(entry::lower);
@@ -260,10 +261,10 @@ Body bodyOf(const LevelSet& levelSet) {
     body.points = loadPoints(levelSet);
     body.mesh = meshOf(levelSet);
     if (body.mesh) {
-        body.accuracy = accuracyOf(entries.get<std::string>(entry::measure));
+        body.accuracy = accuracyOf(entries.get<std::string>(entry::accuracy));
         requireMeshOf(levelSet, *body.mesh);
     } else {
-        entries.requireAbsent(entry::measure, meshEntry);
+        entries.requireAbsent(entry::accuracy, meshEntry);
     }
     check(body, *levelSet.grids().distance);
     return body;
@@ -278,7 +279,7 @@ using namespace detail;
 const char* nameOf(ContactAccuracy accuracy) {
     for (const auto& [one, name] : accuracyNames)
         if (one == accuracy) return name;
-    throw std::invalid_argument("no such measure");
+    throw std::invalid_argument(fmt::format("{} is no contact accuracy", int(accuracy)));
 }
 
 bool hasBody(const LevelSet& levelSet) {

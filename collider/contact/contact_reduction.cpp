@@ -25,7 +25,7 @@ constexpr float restTolerance = 3e-3f;
 // Contacts are chosen again when the bodies have moved relative to each other by this fraction of the tolerance.
 constexpr float slackTolerances = 0.5f;
 // They are chosen again, too, when another contact is deeper by this fraction of the slack.
-constexpr float pressSlack = pressTolerance / (slackTolerances * reductionTolerance);
+constexpr float normalMotionSlack = normalMotionTolerance / (slackTolerances * reductionTolerance);
 
 bool isStill(const std::vector<Contact>& contacts, std::span<const ContactPatch> last) {
     if (contacts.empty() || last.empty()) return false;
@@ -92,7 +92,7 @@ bool ContactReduction::holds(const Pose& a, const Pose& b) const {
 }
 
 /// Whether all chosen contacts exist again, no contact is predicted, and no other contact is deeper than these by more
-/// than pressTolerance.
+/// than normalMotionTolerance.
 bool ContactReduction::reuse(const std::vector<Contact>& contacts) {
     std::vector<const Contact*> found(kept_.size(), nullptr);
     float deepest = std::numeric_limits<float>::max(), deepestFound = deepest;
@@ -109,7 +109,7 @@ bool ContactReduction::reuse(const std::vector<Contact>& contacts) {
         if (!contact) return false;
         deepestFound = std::min(deepestFound, contact->distance);
     }
-    if (deepest < deepestFound - pressSlack * reduced_.slack) return false;
+    if (deepest < deepestFound - normalMotionSlack * reduced_.slack) return false;
     auto next = found.begin();
     for (ContactPatch& patch : reduced_.patches)
         for (int i = 0; i < patch.count; ++i) patch.contacts[i] = **next++;

@@ -84,10 +84,10 @@ void followEdges(const ConvexInField& body, std::uint32_t index, const NearestPo
             const NearestPoint nearest = body.nearest(from + place * along);
             return {nearest.distance, nearest.normal};
         };
-        const auto slopeAt = [&](float place) -> std::optional<Slope> {
+        const auto slopeAt = [&](float place) -> std::optional<ValueAndSlope> {
             return slopeAlong(along, place, sampleAt(place));
         };
-        const Slope first = slopeAlong(along, 0, {here.distance, here.normal}), last = *slopeAt(length);
+        const ValueAndSlope first = slopeAlong(along, 0, {here.distance, here.normal}), last = *slopeAt(length);
         // If both ends are within reach, one of them is enough.
         const bool isOther = last.value <= body.edgeReach && next < index;
         if (!fallsBetween(first, last) || isOther) continue;

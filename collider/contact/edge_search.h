@@ -14,32 +14,32 @@ namespace bilayer::detail {
 inline constexpr float searchTolerance = 2e-3f;
 
 /// A function of one variable at a place: value and slope.
-struct Slope {
+struct ValueAndSlope {
     float place, value, slope;
 };
 
 /// The distance of a surface along an edge.
 /// @param along  the edge's direction, of unit length
-inline Slope slopeAlong(const glm::vec3& along, float place, const SurfaceSample& sample) {
+inline ValueAndSlope slopeAlong(const glm::vec3& along, float place, const SurfaceSample& sample) {
     return {place, sample.distance, glm::dot(sample.normal, along)};
 }
 
 /// Whether the function may have a kink between two places or close to one of them. An edge that crosses another one
 /// makes such a kink, which the interpolant rounds off. The function is a distance.
-inline bool mayKinkBetween(const Slope& from, const Slope& to) {
+inline bool mayKinkBetween(const ValueAndSlope& from, const ValueAndSlope& to) {
     constexpr float minSlopeChange = 0.1f;
     constexpr float rounded = 0.5f;  // max remaining slope at the kink itself
     return to.slope - from.slope > minSlopeChange && from.slope < rounded && to.slope > -rounded;
 }
 
 /// Whether the function falls from both ends to a minimum in between. The threshold excludes rounding noise on a plane.
-inline bool fallsBetween(const Slope& from, const Slope& to) {
+inline bool fallsBetween(const ValueAndSlope& from, const ValueAndSlope& to) {
     constexpr float minSlope = 0.02f;
     return from.slope < -minSlope && to.slope > minSlope;
 }
 
 /// Whether an edge may be deeper between two places than at both of them.
-inline bool mayBeDeeperBetween(const Slope& from, const Slope& to) {
+inline bool mayBeDeeperBetween(const ValueAndSlope& from, const ValueAndSlope& to) {
     return fallsBetween(from, to) || mayKinkBetween(from, to);
 }
 
@@ -49,21 +49,21 @@ inline bool mayBeDeeperBetween(const Slope& from, const Slope& to) {
 /// cutting planes of J. E. Kelley, "The cutting-plane method for solving convex programs", J. SIAM 8 (1960) 703-712, in
 /// one dimension). The sequence of steps is fixed, so the result varies as smoothly as the function.
 /// @param tolerance  of the function's value
-/// @param at         (place) -> std::optional<Slope>; std::nullopt where the function is unknown: the search then
-///                   ends without a result
+/// @param at         (place) -> std::optional<ValueAndSlope>; std::nullopt where the function is unknown, which ends
+///                   the search without a result
 template <class Function>
-std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Function&& at) {
+std::optional<ValueAndSlope> minimumBetween(ValueAndSlope from, ValueAndSlope to, float tolerance, Function&& at) {
     constexpr int maxQueries = 7;
-    constexpr float flat = 0.01f;        // slopes below this count as zero
-    constexpr float nearestEnd = 0.02f;  // min distance of queries from the ends, as a fraction of the interval
-    Slope best = from.value < to.value ? from : to;
+    constexpr float flat = 0.01f;            // slopes below this count as zero
+    constexpr float minEndDistance = 0.02f;  // min distance of queries from the ends, as a fraction of the interval
+    ValueAndSlope best = from.value < to.value ? from : to;
     for (int i = 0; i < maxQueries; ++i) {
         const float width = to.place - from.place, slopeChange = to.slope - from.slope;
         if (!(slopeChange > 0)) break;
         const bool tangents = i % 2 == 0;
         const float offset = tangents ? from.value - to.value + to.slope * width : -from.slope * width;
-        const float part = std::fmin(std::fmax(offset / (slopeChange * width), nearestEnd), 1 - nearestEnd);
-        const std::optional<Slope> next = at(from.place + part * width);
+        const float part = std::fmin(std::fmax(offset / (slopeChange * width), minEndDistance), 1 - minEndDistance);
+        const std::optional<ValueAndSlope> next = at(from.place + part * width);
         if (!next) return std::nullopt;
         if (next->value <= best.value) best = *next;
         const float below = from.value + from.slope * part * width;
@@ -74,10 +74,11 @@ std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Functi
 }
 
 /// The deepest place of an edge between two places: the minimum where the distance falls to one, else the lower end.
-/// Arguments are those of lowestBetween().
+/// Arguments are those of minimumBetween().
 template <class Function>
-std::optional<Slope> deepestBetween(const Slope& from, const Slope& to, float tolerance, Function&& at) {
-    if (fallsBetween(from, to)) return lowestBetween(from, to, tolerance, at);
+std::optional<ValueAndSlope> deepestBetween(const ValueAndSlope& from, const ValueAndSlope& to, float tolerance,
+                                            Function&& at) {
+    if (fallsBetween(from, to)) return minimumBetween(from, to, tolerance, at);
     return from.value < to.value ? from : to;
 }
 

@@ -38,7 +38,7 @@ class EdgesInField {
             if (!there) continue;
             // if both ends touch, process the edge only once
             if (std::max(sample.distance, there->distance) <= reach_ && next < index) continue;
-            const Slope from = slopeAlong(along, 0, here), to = slopeAlong(along, length, *there);
+            const ValueAndSlope from = slopeAlong(along, 0, here), to = slopeAlong(along, length, *there);
             if (!mayBeDeeperBetween(from, to)) continue;
             if (const auto deepest = deepestOf(at, end, along, from, to, edge.conormals)) {
                 const float part = deepest->place / length;
@@ -58,17 +58,19 @@ class EdgesInField {
     };
 
     std::optional<EdgeContact> deepestOf(const glm::vec3& start, const glm::vec3& end, const glm::vec3& along,
-                                         const Slope& from, const Slope& to, const Conormals& conormals) const {
+                                         const ValueAndSlope& from, const ValueAndSlope& to,
+                                         const Conormals& conormals) const {
         const auto sampleAt = [&](float place) {
             const glm::vec3 point = start + place * along;
             return other_.at(point, other_.field().sample(point), reach_ + to.place);
         };
-        const auto slopeAt = [&](float place) -> std::optional<Slope> {
+        const auto slopeAt = [&](float place) -> std::optional<ValueAndSlope> {
             const auto sample = sampleAt(place);
             if (!sample) return std::nullopt;
             return slopeAlong(along, place, *sample);
         };
-        const std::optional<Slope> lowest = deepestBetween(from, to, searchTolerance * other_.voxelSize(), slopeAt);
+        const std::optional<ValueAndSlope> lowest =
+            deepestBetween(from, to, searchTolerance * other_.voxelSize(), slopeAt);
         const auto here = lowest ? sampleAt(lowest->place) : std::nullopt;
         if (!here) return std::nullopt;
 

@@ -17,7 +17,7 @@ namespace {
 
 // Small triangles whose planes enclose less than 108 degrees have no crease that a convex vertex could be below
 // (tangent).
-constexpr float steepestCrease = 3;
+constexpr float maxCreaseSlope = 3;
 
 }  // namespace
 
@@ -63,7 +63,7 @@ void FaceContacts::visitSmall(std::uint32_t triangle, TriangleFace& face, const 
     const glm::vec3 normal = face.normalFacing(point);
     if (glm::dot(normal, face.corners[0] - vertex.place) > field_.margin) return;
     const float height = face.heightOf(vertex.place), rounding = onFace * field_.spacing;
-    if (height > field_.reach || face.isOutside(vertex.place, rounding + steepestCrease * height)) return;
+    if (height > field_.reach || face.isOutside(vertex.place, rounding + maxCreaseSlope * height)) return;
     if (face.isOutside(vertex.place, rounding)) {
         face.findNeighbours(triangles_.adjacency(), triangle);
         if (face.isOutsideAboveCreases(vertex.place, rounding)) return;
@@ -114,7 +114,8 @@ std::optional<Contact> FaceContacts::contactOver(const TriangleFace& face, bool 
     if (height <= field_.margin && height_.isExact(index, normal, height, there))
         return contactAt(place, normal, height);
     if (isFar || !probesFoot) return std::nullopt;
-    if (glm::dot(point.normal, normal) < minFacing || !height_.bendsTo(foot, there.normal, normal)) return std::nullopt;
+    if (glm::dot(point.normal, normal) < minFacing || !height_.hasEdgeNear(foot, there.normal, normal))
+        return std::nullopt;
     return contactAtFoot(foot, normal, there);
 }
 
@@ -154,7 +155,7 @@ std::optional<Contact> FaceContacts::contactAtFoot(const glm::vec3& foot, const 
                                                    const LocalField::FieldSample& there) {
     std::optional<Contact> contact = field_.local.probe(foot, there, 0, 0, field_.margin, report_);
     if (!contact) return std::nullopt;
-    const bool isSeparated = !(std::abs(there.distance) <= touchingFoot * field_.voxel);
+    const bool isSeparated = !(std::abs(there.distance) <= touchingDistance * field_.voxel);
     const glm::quat& rotation = field_.placed.pose.rotation;
     const auto facesEdge = [&] {
         const auto normalAt = [&](const glm::vec3& place) { return field_.local.at(place).normal; };

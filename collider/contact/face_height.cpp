@@ -24,25 +24,26 @@ bool FaceHeight::isExact(std::uint32_t index, const glm::vec3& normal, float hei
                          const LocalField::FieldSample& foot) const {
     const Collider& collider = field_.placed.collider;
     const SurfacePoint& point = collider.data().points().points()[index];
-    // a foot on the medial axis has no normal: then the normal of the face point tells the side
+    // a foot on the medial axis has no normal: then the normal of the face point decides the side
     const bool isUnclear = foot.where == LocalField::FieldSample::noNormal && !point.isSharp;
     const float facing = glm::dot(foot.normal, normal), required = point.isSharp ? minFacing : 0;
     const bool isNearSide =
         height >= 0 || isUnclear || (foot.where == LocalField::FieldSample::nearSurface && facing >= required);
     const bool isNearest = std::abs(foot.distance - height) <= maxInterpolationError * field_.voxel && isNearSide;
     const bool passes = passesNormalFilter({}, glm::dot(normal, point.normal), true);
-    if (isNearest && passes && (point.isSharp || bendsTo(field_.placed.scale * point.position, point.normal, normal)))
+    if (isNearest && passes &&
+        (point.isSharp || hasEdgeNear(field_.placed.scale * point.position, point.normal, normal)))
         return true;
     if (!(isNearest || height < 0) || !isConvexVertex(index, normal)) return false;
     return isNearest || hasPenetrated(point, normal, height, distanceAlongAxis(point, normal, height));
 }
 
-bool FaceHeight::bendsTo(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const {
+bool FaceHeight::hasEdgeNear(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const {
     return holdsDuringRotation(normal, field_.local.relativeMotion().rotation(),
-                               [&](const glm::vec3& rotated) { return bendsNowTo(place, surfaceNormal, rotated); });
+                               [&](const glm::vec3& rotated) { return hasEdgeNearNow(place, surfaceNormal, rotated); });
 }
 
-bool FaceHeight::bendsNowTo(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const {
+bool FaceHeight::hasEdgeNearNow(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const {
     const float cosine = glm::dot(surfaceNormal, normal);
     if (cosine >= straight) return true;
     const glm::vec3 deeper = glm::normalize(normal - cosine * surfaceNormal),
@@ -68,7 +69,7 @@ bool FaceHeight::hasPenetrated(const SurfacePoint& vertex, const glm::vec3& norm
     if (!(field_.local.at(behind).distance < 0)) return false;
     if (-height < field_.voxel) return true;
     return glm::dot(field_.local.at(through).normal, normal) > farSide &&
-           triangles_.distance(through) < touchingFoot * field_.voxel &&
+           triangles_.distance(through) < touchingDistance * field_.voxel &&
            triangles_.distance(place) > (onFace - 1) * height;
 }
 

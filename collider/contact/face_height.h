@@ -15,7 +15,7 @@ namespace bilayer::detail {
 inline constexpr float onFace = 1e-4f;
 /// A body closer than this to a point of the face touches the face [voxels]: next to an edge or a vertex, normals are
 /// mixed.
-inline constexpr float touchingFoot = 0.05f;
+inline constexpr float touchingDistance = 0.05f;
 /// Below this cosine to the face, a normal does not indicate the side of the face that its body is on.
 inline constexpr float minFacing = 0.1f;
 
@@ -33,13 +33,13 @@ class FaceHeight {
     /// - The sides of a penetrating convex vertex are nearer in the same way.
     /// @param normal  of the face, on the side that the point faces
     /// @param height  over the point
-    /// @param foot    the field at the foot
+    /// @param foot    the field at the foot, which is the projection of the point onto the face
     bool isExact(std::uint32_t index, const glm::vec3& normal, float height, const LocalField::FieldSample& foot) const;
 
     /// Whether the field's surface at a place has an edge within the spacing of its points: beyond it, the normal is
     /// another one, at present or during the rotation in the step. Without an edge the surface continues deeper, and
     /// touches elsewhere: at a farther edge, or at the border of the face.
-    bool bendsTo(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const;
+    bool hasEdgeNear(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const;
 
     bool isConvexVertex(std::uint32_t index, const glm::vec3& normal) const;
 
@@ -53,7 +53,7 @@ class FaceHeight {
     bool hasPenetrated(const SurfacePoint& vertex, const glm::vec3& normal, float height, float distance) const;
 
   private:
-    bool bendsNowTo(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const;
+    bool hasEdgeNearNow(const glm::vec3& place, const glm::vec3& surfaceNormal, const glm::vec3& normal) const;
 
     const ProbedField& field_;
     const NearbyTriangles& triangles_;

@@ -17,7 +17,7 @@ namespace {
 // The tolerance is smaller for shifts and twists, which change separations as little as the smallest tilts.
 constexpr float toleranceUntilted = reductionTolerance / 4;
 // A contact of the last step stays while some motion meets it first to within this many tolerances. Contacts that bear
-// a load must not come and go, or a stack never comes to rest.
+// a load must not come and go, or a stack never rests.
 constexpr float hysteresis = 3;
 // The small motions that contacts are kept for: tilts from those of a fall to those of rest [rad], lateral shifts
 // [fractions of the extent] and twists [rad]. Their directions are oblique to typical models, so that each vertex of a
@@ -30,7 +30,7 @@ constexpr float shiftSize = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float directionOffset = 0.3f;  // [rad]
 // The tilts and shifts at which the reduction error is measured [rad], [fractions of the extent].
-constexpr float measuredSize = 1.f / 32;
+constexpr float errorProbeSize = 1.f / 32;
 // Limit of contacts in a patch: more would cost the solver more than they help.
 constexpr std::size_t maxContacts = 3 * patchSize;
 
@@ -63,12 +63,12 @@ std::vector<Perturbation> perturbations() {
 }
 
 /// The motions in between, at which the reduction error is measured.
-std::vector<Perturbation> measuredPerturbations() {
+std::vector<Perturbation> errorPerturbations() {
     std::vector<Perturbation> all;
     for (int k = 0; k < tiltDirections; ++k)
-        all.push_back({.tilt = measuredSize * directionAt((float(k) + 0.5f) / tiltDirections)});
+        all.push_back({.tilt = errorProbeSize * directionAt((float(k) + 0.5f) / tiltDirections)});
     for (int k = 0; k < shiftDirections; ++k)
-        all.push_back({.shift = measuredSize * directionAt((float(k) + 0.5f) / shiftDirections)});
+        all.push_back({.shift = errorProbeSize * directionAt((float(k) + 0.5f) / shiftDirections)});
     return all;
 }
 
@@ -194,8 +194,8 @@ class FirstContactSearch {
             add(separations_.nearest());
         }
         for (std::size_t i = kept_.size(); i-- > 0;)
-            if (isSpare(i) && !mayBear(kept_[i])) leaveOut(i);
-        while (kept_.size() > maxContacts) leaveOut(redundant());
+            if (isRedundant(i) && !mayCarryLoad(kept_[i])) remove(i);
+        while (kept_.size() > maxContacts) remove(whichToRemove());
         // where separations exceed floats, no motion meets any
         if (kept_.empty()) add(separations_.nearest());
         return kept_;
@@ -203,7 +203,7 @@ class FirstContactSearch {
 
     /// The maximum depth that motions in between reach before the chosen contacts touch [m].
     float reductionError() {
-        static const std::vector<Perturbation> between = measuredPerturbations();
+        static const std::vector<Perturbation> between = errorPerturbations();
         float error = 0;
         for (const Perturbation& perturbation : between) {
             const float first = separations_.minSeparation(perturbation);
@@ -215,12 +215,16 @@ class FirstContactSearch {
   private:
     using Motions = std::uint64_t;  ///< one bit each
 
-    /// The last motion, which is a mere press, while no body approaches another.
-    bool isPressAtRest(std::size_t n) const { return n + 1 == perturbations_.size() && separations_.rotation() == 0; }
+    /// The last motion, which is a translation along the normal, while no body approaches another.
+    bool isNormalMotionAtRest(std::size_t n) const {
+        return n + 1 == perturbations_.size() && separations_.rotation() == 0;
+    }
 
     float toleranceOf(std::size_t n) const {
         const bool tilts = perturbations_[n].tilt != glm::vec2(0);
-        const float tolerance = tilts ? reductionTolerance : isPressAtRest(n) ? pressTolerance : toleranceUntilted;
+        const float tolerance = tilts                     ? reductionTolerance
+                                : isNormalMotionAtRest(n) ? normalMotionTolerance
+                                                          : toleranceUntilted;
         return tolerance * separations_.extent();
     }
 
@@ -248,35 +252,35 @@ class FirstContactSearch {
 
     /// Whether a kept contact touches not much later than the first one in a motion.
     bool isNearlyMet(std::size_t n) const {
-        if (isPressAtRest(n)) return false;
+        if (isNormalMotionAtRest(n)) return false;
         return separations_.minOf(kept_, perturbations_[n]) <= minSeparations_[n] + hysteresis * toleranceOf(n);
     }
 
     /// Whether every motion that meets this contact first is covered by another kept contact.
-    bool isSpare(std::size_t i) const { return !(met_[i] & ~metByAny(i)); }
+    bool isRedundant(std::size_t i) const { return !(met_[i] & ~metByAny(i)); }
 
-    /// Whether a press could have loaded the contact.
-    bool mayBear(std::uint32_t k) const {
+    /// Whether a translation along the normal could have loaded the contact.
+    bool mayCarryLoad(std::uint32_t k) const {
         return separations_.of(k, {}) <=
                minSeparations_.back() + hysteresis * reductionTolerance * separations_.extent();
     }
 
     /// The redundant contact that is farthest away, or else the last one; but none that bears a body at rest.
-    std::size_t redundant() const {
+    std::size_t whichToRemove() const {
         std::size_t which = kept_.size();
         for (std::size_t i = 0; i < kept_.size(); ++i)
-            if (isSpare(i) &&
+            if (isRedundant(i) &&
                 (which == kept_.size() || separations_.of(kept_[i], {}) > separations_.of(kept_[which], {})))
                 which = i;
         if (which < kept_.size()) return which;
-        const std::size_t press = perturbations_.size() - 1;
-        const Motions bearing = isPressAtRest(press) ? Motions(1) << press : 0;
+        const std::size_t last = perturbations_.size() - 1;
+        const Motions bearing = isNormalMotionAtRest(last) ? Motions(1) << last : 0;
         for (which = kept_.size() - 1; which > 0 && met_[which] & bearing; --which) {
         }
         return which;
     }
 
-    void leaveOut(std::size_t i) {
+    void remove(std::size_t i) {
         kept_.erase(kept_.begin() + std::ptrdiff_t(i));
         met_.erase(met_.begin() + std::ptrdiff_t(i));
     }

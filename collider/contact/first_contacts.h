@@ -19,7 +19,7 @@ inline constexpr float reductionTolerance = 1e-3f;
 /// The same for the deepest contact, which a motion along the normal touches first. If the kept contacts are less deep,
 /// the bodies are pushed apart by the difference as soon as the deepest one is chosen again. A body that rocks on a
 /// crest would gain this height in each cycle.
-inline constexpr float pressTolerance = reductionTolerance / 16;
+inline constexpr float normalMotionTolerance = reductionTolerance / 16;
 
 struct FirstContacts {
     std::vector<std::uint32_t> kept;  ///< indices into the group

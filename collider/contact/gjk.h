@@ -38,11 +38,11 @@ struct Simplex {
         return mean([](const SimplexVertex& vertex) { return vertex.difference(); });
     }
 
-    /// Whether there is no room for a vertex.
-    bool isWhole() const { return count == vertices.size(); }
+    /// Whether no further vertex fits.
+    bool isFull() const { return count == vertices.size(); }
 
     /// Adds a vertex, and keeps the smallest part of the simplex that holds its point nearest to the origin. Requires
-    /// room.
+    /// !isFull().
     void add(const SimplexVertex& vertex);
 };
 
@@ -70,7 +70,7 @@ ConvexPair convexDistance(const SupportA& supportA, const SupportB& supportB, do
     glm::dvec3 towardsA = simplex.nearest();
     double length = glm::length(towardsA);
     // a whole simplex contains the origin, whatever rounding makes of its nearest point
-    for (int i = 0; i < maxIterations && length > tolerance && !simplex.isWhole(); ++i) {
+    for (int i = 0; i < maxIterations && length > tolerance && !simplex.isFull(); ++i) {
         const SimplexVertex next = supportOf(towardsA);
         // no point of the difference is nearer than this
         const double bound = glm::dot(next.difference(), towardsA) / length;
@@ -83,7 +83,7 @@ ConvexPair convexDistance(const SupportA& supportA, const SupportB& supportB, do
         // rounding: the simplex gets no nearer
         if (!(length < before)) break;
     }
-    pair.distance = length > tolerance && !simplex.isWhole() ? length : 0;
+    pair.distance = length > tolerance && !simplex.isFull() ? length : 0;
     pair.onA = simplex.mean([](const SimplexVertex& vertex) { return vertex.ofA; });
     pair.onB = simplex.mean([](const SimplexVertex& vertex) { return vertex.ofB; });
     return pair;

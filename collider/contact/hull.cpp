@@ -51,7 +51,7 @@ class QhullRun {
   private:
     char* text_ = nullptr;
     std::size_t textSize_ = 0;
-    std::FILE* messages_;  // writes to `text_`, which nobody reads
+    std::FILE* messages_;  // writes to `text_`, which is discarded
     qhT qh_;
     int status_;
 };

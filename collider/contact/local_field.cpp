@@ -136,16 +136,16 @@ std::optional<Contact> LocalField::deepestContact(const ProbedEdge& edge, float 
     const EdgeInterval interval{edge, from, to, glm::distance(edge.place(from), edge.place(to))};
     // as short as rounding: it has no direction
     if (!(interval.length > searchTolerance * voxel_)) return std::nullopt;
-    const Slope first = slopeOf(interval, 0, atFrom), last = slopeOf(interval, interval.length, atTo);
+    const ValueAndSlope first = slopeOf(interval, 0, atFrom), last = slopeOf(interval, interval.length, atTo);
     const bool isNear = std::min(first.value, last.value) - 0.5f * interval.length <= margin;
     if (!isNear || !mayBeDeeperBetween(first, last)) return std::nullopt;
-    const auto slopeAt = [&](float distance) -> std::optional<Slope> {
+    const auto slopeAt = [&](float distance) -> std::optional<ValueAndSlope> {
         const float fraction = interval.fractionAt(distance);
         const FieldSample sample = at(edge.place(fraction), edge.radiusAt(fraction));
         if (!sample.isKnown()) return std::nullopt;
         return slopeOf(interval, distance, sample);
     };
-    const std::optional<Slope> lowest = deepestBetween(first, last, searchTolerance * voxel_, slopeAt);
+    const std::optional<ValueAndSlope> lowest = deepestBetween(first, last, searchTolerance * voxel_, slopeAt);
     if (!lowest) return std::nullopt;
     const float fraction = interval.fractionAt(lowest->place);
     const FieldSample here = at(edge.place(fraction), edge.radiusAt(fraction));
@@ -158,7 +158,7 @@ std::optional<Contact> LocalField::deepestContact(const ProbedEdge& edge, float 
     return contactAcross(interval, lowest->place, here, margin);
 }
 
-Slope LocalField::slopeOf(const EdgeInterval& interval, float distance, const FieldSample& sample) const {
+ValueAndSlope LocalField::slopeOf(const EdgeInterval& interval, float distance, const FieldSample& sample) const {
     const ProbedEdge& edge = interval.edge;
     const float fraction = interval.fractionAt(distance);
     const float growth = (edge.radius[1] - edge.radius[0]) * (interval.to - interval.from) / interval.length;

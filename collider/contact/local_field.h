@@ -96,7 +96,7 @@ class LocalField {
     bool mayReach(const glm::vec3& from, const glm::vec3& to, float reach) const;
     std::optional<Contact> speculativeContact(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
                                               float distance) const;
-    Slope slopeOf(const EdgeInterval& interval, float distance, const FieldSample& sample) const;
+    ValueAndSlope slopeOf(const EdgeInterval& interval, float distance, const FieldSample& sample) const;
     std::optional<SharpEdges::Crossing> crossingAt(const ProbedEdge& edge, float fraction,
                                                    const FieldSample& there) const;
     std::optional<Contact> contactAcross(const EdgeInterval& interval, float distance, const FieldSample& there,

@@ -158,7 +158,7 @@ class PairSearch {
     PairSearch(const MeshTree& a, const MeshTree& b, const Similarity& aToB, double maxDistance)
         : a_(a, aToB), b_(b, identity_) {
         rootA_ = {a.tree().root()}, rootB_ = {b.tree().root()};
-        room_ = tolerance * std::sqrt(std::max(a_.boundsOf(rootA_).size2(), b_.boundsOf(rootB_).size2()));
+        margin_ = tolerance * std::sqrt(std::max(a_.boundsOf(rootA_).size2(), b_.boundsOf(rootB_).size2()));
         best_.distance = maxDistance;
         setLimit();
     }
@@ -249,19 +249,19 @@ class PairSearch {
         const TrianglePair pair = closestPoints(cornersA, cornersB);
         if (!(pair.distance2 <= best_.distance * best_.distance)) return;
         best_ = {a, b, pair.a, pair.b, std::sqrt(pair.distance2)};
-        if (best_.distance > room_) direction_ = (pair.a.position - pair.b.position) / best_.distance;
+        if (best_.distance > margin_) direction_ = (pair.a.position - pair.b.position) / best_.distance;
         setLimit();
     }
 
     void setLimit() {
-        limit_ = std::max(best_.distance - room_, 0.0);
+        limit_ = std::max(best_.distance - margin_, 0.0);
         limit2_ = limit_ * limit_;
     }
 
     const Similarity identity_;
     PosedTree a_, b_;
     PosedNode rootA_, rootB_;
-    double room_, limit_, limit2_;
+    double margin_, limit_, limit2_;
     MeshDistance best_;
     glm::dvec3 direction_{0};  // of the closest pair, from B to A: triangles are no closer than along it
     LeafCache leavesA_, leavesB_;

@@ -69,11 +69,11 @@ bool passesNormalFilter(const ContactOptions& options, const glm::vec3& surfaceN
 template <class NormalAt>
 bool facesEdgeObliquely(const glm::vec3& position, const glm::vec3& normal, float distance,
                         const glm::vec3& surfaceNormal, NormalAt&& normalAt) {
-    constexpr float straighter = 0.1f;
+    constexpr float maxRemainingPart = 0.1f;  // of 1 - cosine: on an edge, the normals there are almost opposite
     const float cosine = -glm::dot(surfaceNormal, normal);
     if (cosine > sameFaceCosine) return false;
     const glm::vec3 there = normalAt(position - distance * surfaceNormal - cosine * distance * normal);
-    return 1 + glm::dot(there, normal) < straighter * (1 - cosine);
+    return 1 + glm::dot(there, normal) < maxRemainingPart * (1 - cosine);
 }
 
 }  // namespace bilayer::detail

@@ -30,8 +30,8 @@ constexpr float testDepth = 0.25f;
 // beyond its initial depth [voxels].
 constexpr float maxDeepening = 0.1f, maxDepth = testDepth + maxDeepening;
 // A stopped body goes back by this much at most from where the test point entered [voxels]. An oblique path touches far
-// before it enters. Where the surface bends in between, the next step's contacts would not see what the body met, and
-// stop it in the same place again.
+// before it enters. Where the surface bends in between, the next step's contacts would miss the surface that the body
+// met, and it would be stopped in the same place again.
 constexpr float maxReturn = 0.5f;
 // Arcs are approximated by chords of this angle [rad]; their error is its square over eight, in fractions of the
 // radius.
@@ -137,7 +137,7 @@ class PointSweep {
                 if (after > (startsInside ? maxDeepening * voxel_ : maxDepth * voxel_ + touching)) {
                     const float descent = after - before, back = maxReturn * voxel_ / glm::distance(from, to);
                     float part = std::max(touching - before, -before - back * descent) / descent;
-                    // without a way back, the body moves on to the entry, where contacts see what it meets
+                    // there is no path before the start to go back on: the body stops where the point enters
                     if (i == 0 && part < 0) part = std::max(-before / descent, 0.f);
                     const float time = transforms_[i].time + part * (transforms_[i + 1].time - transforms_[i].time);
                     first_ = {std::clamp(time, 0.f, first_.time), entered->position - offset, entered->normal};

@@ -50,7 +50,7 @@ class PointsInField {
         const float voxel = field().voxelSize();
         // voxels outside the band have no values: a list must not reach that far
         const float maxSlack =
-            std::min(voxel, (field().exteriorWidth() - reach_) / steepestInterpolant - rounding * voxel);
+            std::min(voxel, (field().exteriorWidth() - reach_) / maxInterpolantSlope - rounding * voxel);
         const CandidateLists::RelativePose pose{body_.collider.id(), other_.collider.id(), reach_, transform_.linear,
                                                 transform_.shift};
         if (candidates->holds(pose, centre_, radius_, voxel, maxSlack))
@@ -127,7 +127,7 @@ class PointsInField {
     // at most the max slope times the slack, and the distance by the slack.
     template <class Found>
     void visitAndList(CandidateLists::List& candidates, ContactReport& report, Found& found) {
-        const float slack = candidates.slack(), above = reach_ + steepestInterpolant * slack, within = reach_ + slack,
+        const float slack = candidates.slack(), above = reach_ + maxInterpolantSlope * slack, within = reach_ + slack,
                     beyondBand = within + maxInterpolationError * field().voxelSize(),
                     kept = minRejectedDistance(within);
         descend([&](const glm::vec3&, float) { return kept; },

@@ -36,7 +36,8 @@ openvdb::Metadata::Ptr packMesh(const Mesh& mesh) {
     const MeshHead head{hash(mesh), mesh.points.size(), mesh.triangles.size()};
     if (bytesOf(head) > maxMeshBytes)
         throw std::invalid_argument(
-            "the mesh is too large to store with its field: leave it out (Body::mesh, --no-mesh)");
+            "the mesh is too large to store with its field: leave it out (withBody() with keepMesh = false, "
+            "--no-mesh)");
     Bytes::ByteVec bytes(bytesOf(head));
     const std::size_t pointBytes = head.points * sizeof(glm::vec3);
     std::memcpy(bytes.data(), &head, sizeof(head));

@@ -56,7 +56,7 @@ class Collector {
   public:
     void add(std::int32_t feature, const SurfacePoint& point) {
         if (!isFinite(point.position) || !isUnit(glm::length(point.normal)))
-            refuseBody(fmt::format("surface point {} is no place with a normal", feature));
+            refuseBody(fmt::format("surface point {} needs a finite position and a normal of unit length", feature));
         points_.emplace_back(feature, point);
     }
 
@@ -66,7 +66,9 @@ class Collector {
         std::vector<SurfacePoint> ordered;
         for (const auto& [feature, point] : points_) {
             if (feature != std::int64_t(ordered.size()))
-                refuseBody(fmt::format("a surface point has the number {} of another, or none", feature));
+                refuseBody(
+                    fmt::format("the surface points must have the numbers 0, 1, 2, ...; one has {} in place of {}",
+                                feature, ordered.size()));
             ordered.push_back(point);
         }
         return ordered;

@@ -55,7 +55,7 @@ bool FieldSurface::staysOut(const glm::vec3& from, const glm::vec3& to, float ra
     const float voxel = field_.voxelSize(), error = field_.mesh() ? maxInterpolationError * voxel : 0;
     return staysClear(from, to, minStride * voxel, [&](const glm::vec3& at) {
         const Sample sample = field_.sampleWithin(at, 0);
-        return sample.inBand && radius == 0 ? (sample.distance - error) / steepestInterpolant
+        return sample.inBand && radius == 0 ? (sample.distance - error) / maxInterpolantSlope
                                             : sample.distance - radius - maxInterpolationError * voxel;
     });
 }

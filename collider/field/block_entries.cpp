@@ -28,7 +28,7 @@ constexpr std::uint32_t maxTreeNodes = 1 << 24;
 constexpr std::size_t grain = 256;  // cubes per task
 /// log2 of a cube's side [voxels]. A cube is one block, or larger if `fewEntries` entries hold the leaves near it.
 /// These are read as fast as one, and all of them fit into a cache that is too small for entries of single blocks.
-constexpr int blockShift = 3, largestShift = 5, fewEntries = 2;
+constexpr int blockShift = 3, maxShift = 5, fewEntries = 2;
 static_assert(FieldFrame::side == 1 << blockShift);
 
 struct Region {
@@ -80,7 +80,7 @@ class EntryBuilder {
           side_(float(1 << shift)),
           step_(double(side_) * field.voxel * perMetre),
           reach_(reach),
-          room_(frameRounding + treeRounding * float(std::max({tree.size.x, tree.size.y, tree.size.z}))) {}
+          margin_(frameRounding + treeRounding * float(std::max({tree.size.x, tree.size.y, tree.size.z}))) {}
 
     // The count of nodes near a cube, at the finest level that fits into entries, and whether they are leaves.
     std::pair<std::size_t, bool> count(const glm::ivec3& cube) {
@@ -102,7 +102,7 @@ class EntryBuilder {
     // Finds the nodes near a cube, level by level from the root, until there are too many.
     void descend(const glm::ivec3& cube) {
         const glm::vec3 lower = lowerOf(cube);
-        const Region region{lower - room_, lower + side_ + room_, reach_ * reach_};
+        const Region region{lower - margin_, lower + side_ + margin_, reach_ * reach_};
         count_ = 0;
         add(tree_.root(), region, next());
         while (levels_[count_ - 1].count > 0 && !tree_.isLeaf(levels_[count_ - 1].nodes[0])) {
@@ -124,7 +124,7 @@ class EntryBuilder {
     void write(const NodeList& list, const glm::vec3& corner, BlockEntry* entries, int each) const {
         constexpr float highest = BlockEntries::regionUnits;
         const float perVoxel = highest / (side_ + 2 * reach_),
-                    room = room_ * perVoxel + 1.f / BlockEntries::placesPerUnit;
+                    margin = margin_ * perVoxel + 1.f / BlockEntries::placesPerUnit;
         for (int i = 0; i < each; ++i) {
             std::memset(&entries[i], 0, sizeof(BlockEntry));
             std::memset(entries[i].lower, BlockEntries::regionUnits, sizeof entries[i].lower);
@@ -133,8 +133,8 @@ class EntryBuilder {
             BlockEntry& entry = entries[i / BlockEntry::slots];
             const std::size_t slot = i % BlockEntry::slots;
             for (int k = 0; k < 3; ++k) {
-                const float low = (list.lower[k][i] - corner[k]) * perVoxel - room;
-                const float high = (list.upper[k][i] - corner[k]) * perVoxel + room;
+                const float low = (list.lower[k][i] - corner[k]) * perVoxel - margin;
+                const float high = (list.upper[k][i] - corner[k]) * perVoxel + margin;
                 entry.lower[k][slot] = std::uint8_t(std::clamp(low, 0.f, highest));
                 entry.upper[k][slot] = std::uint8_t(std::clamp(high + 1, 0.f, highest));
                 entry.nodes[slot][k] = std::uint8_t(list.nodes[i] >> 8 * k);
@@ -146,7 +146,7 @@ class EntryBuilder {
     glm::dvec3 origin_;  // of the field in the tree's frame [voxels]
     float side_;         // of a cube [voxels]
     double step_;        // the same in the tree's frame
-    float reach_, room_;
+    float reach_, margin_;
     std::vector<NodeList> levels_;
     std::size_t count_ = 0;  // of filled levels
 };
@@ -208,7 +208,7 @@ BlockEntries::BlockEntries(const FieldLayout& field, const WideTree& tree, doubl
     extent_ = glm::dvec3(FieldFrame::side * field.blocks);
     std::vector<glm::ivec3> cubes;
     const auto builderOf = [&] { return EntryBuilder(field, tree, perMetre, reach, shift_); };
-    for (shift_ = largestShift;; --shift_) {
+    for (shift_ = maxShift;; --shift_) {
         cubes = number(field);
         const Need need = needOf(builderOf(), cubes);
         each_ = need.entries;

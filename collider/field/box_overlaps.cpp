@@ -26,13 +26,13 @@ class BoxSearch {
         : mesh_(mesh.mesh()), tree_(mesh.tree()), place_(mesh, box.centre), box_(box) {
         const double perMetre = 1 / double(mesh.voxelSize());
         const glm::dvec3 half = box.halfSize * perMetre;
-        const float room = passTolerance + place_.slack;
-        const float radius = std::min(float(glm::length(half)) * (1 + passRounding) + room, longestReach);
+        const float margin = passTolerance + place_.slack;
+        const float radius = std::min(float(glm::length(half)) * (1 + passRounding) + margin, maxReach);
         limit2_ = radius * radius * roundUp;
         for (int k = 0; k < 3; ++k) {
             axes_[k] = glm::vec3(box.axes[k]);
-            half_[k] = float(half[k]) * (1 + passRounding) + 2 * room;
-            around_[k] = float(glm::dot(glm::abs(glm::transpose(box.axes)[k]), half)) * (1 + passRounding) + 2 * room;
+            half_[k] = float(half[k]) * (1 + passRounding) + 2 * margin;
+            around_[k] = float(glm::dot(glm::abs(glm::transpose(box.axes)[k]), half)) * (1 + passRounding) + 2 * margin;
         }
     }
 

@@ -37,9 +37,9 @@ bool isBox(const OrientedBox& box) {
 std::optional<bool> overlapsRoughly(const FieldData& field, const glm::vec3& centre, float radius) {
     const Sample here = field.sample(field.toLocal(centre));
     const float away = std::abs(here.distance);
-    const float room = field.error + (here.inBand ? cellDiagonal * field.voxelSize : 0.f);
-    if (away > radius + room) return here.distance < 0;
-    if (here.inBand && away + room < radius) return true;
+    const float margin = field.error + (here.inBand ? cellDiagonal * field.voxelSize : 0.f);
+    if (away > radius + margin) return here.distance < 0;
+    if (here.inBand && away + margin < radius) return true;
     return std::nullopt;
 }
 

@@ -14,11 +14,11 @@ inline constexpr float cellDiagonal = 1.7320508f;
 inline constexpr float maxInterpolationError = 0.87f;
 
 /// Max slope of the interpolant: a voxel along each axis at once.
-inline constexpr float steepestInterpolant = 1.7321f;
+inline constexpr float maxInterpolantSlope = 1.7321f;
 
 /// Points no farther outside the surface than this are in the band. Both lengths are in one unit.
 inline float surelyInBand(float exteriorWidth, float voxelSize) {
-    return exteriorWidth - steepestInterpolant * voxelSize;
+    return exteriorWidth - maxInterpolantSlope * voxelSize;
 }
 
 }  // namespace bilayer::detail

@@ -47,7 +47,7 @@ class NearestSearch {
         tree_ = &tree;
         groups_ = groups;
         point_ = SplitPoint(point);
-        const float reach = std::min(bound, longestReach);
+        const float reach = std::min(bound, maxReach);
         best2_ = reach * reach;
         part_ = MeshTree::noPart;
     }

@@ -81,10 +81,10 @@ class RayTraversal {
         const Vec acrossAC = det(x, y, load(leaf.directionAC[0]), load(leaf.directionAC[1]));
         // the sum of the coordinates is an upper bound of the distance
         const Vec away = hn::Add(hn::Add(hn::Abs(q[0]), hn::Abs(q[1])), hn::Abs(q[2]));
-        const Vec room = hn::Add(hn::Mul(hn::Set(tag, passRounding), away), hn::Set(tag, passTolerance));
+        const Vec margin = hn::Add(hn::Mul(hn::Set(tag, passRounding), away), hn::Set(tag, passTolerance));
         const Vec inside = hn::Min(hn::Min(y, along), hn::Min(acrossBC, acrossAC));
-        return bitsOf(hn::And(hn::Ge(hn::Add(inside, room), hn::Zero(tag)),
-                              hn::Le(along, hn::Add(hn::Mul(hn::Set(tag, limit_), steep), room))));
+        return bitsOf(hn::And(hn::Ge(hn::Add(inside, margin), hn::Zero(tag)),
+                              hn::Le(along, hn::Add(hn::Mul(hn::Set(tag, limit_), steep), margin))));
     }
 
     template <class Visit>

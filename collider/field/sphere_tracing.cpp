@@ -44,7 +44,7 @@ class TouchSearch {
     // Only triangles within this distance from the start can be touched before the best one.
     void limit() {
         const double reach = (radius_ + hit_.along) / double(mesh_.voxelSize());
-        const float rounded = std::min(float(reach) * (1 + passRounding) + passTolerance + place_.slack, longestReach);
+        const float rounded = std::min(float(reach) * (1 + passRounding) + passTolerance + place_.slack, maxReach);
         limit2_ = rounded * rounded * roundUp;
     }
 

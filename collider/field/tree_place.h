@@ -47,7 +47,7 @@ struct SplitPoint {
 // distance, up to the slack of a TreePlace.
 inline glm::dvec3 withinReach(const glm::dvec3& p) {
     const double away = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-    return away > double(farthestPlace) ? p * (double(farthestPlace) / away) : p;
+    return away > double(maxCoordinate) ? p * (double(maxCoordinate) / away) : p;
 }
 
 // A point in the tree's frame within reach, with the max rounding of boxes relative to it [voxels].

@@ -23,7 +23,7 @@ namespace bilayer::detail {
 inline constexpr double reachTolerance = 0.1 * zeroTolerance;
 
 /// The point with the smallest key so far. Keys count up to a tolerance beyond the reach: otherwise a search that finds
-/// nothing would have to tell all keys from the reach, however close they are.
+/// nothing would have to compare keys with the reach that differ from it by rounding only.
 struct BestZero {
     double reach;
     double best = reach + reachTolerance;

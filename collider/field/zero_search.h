@@ -22,8 +22,8 @@
 namespace bilayer::detail {
 
 /// Cubes of this side are not subdivided: their diagonal is within zeroTolerance.
-inline constexpr double smallestSide = 1.0 / 2048;
-static_assert(double(cellDiagonal) * smallestSide < zeroTolerance);
+inline constexpr double minSide = 1.0 / 2048;
+static_assert(double(cellDiagonal) * minSide < zeroTolerance);
 
 /// A cube of 2^level voxels in the directory.
 struct DirectoryCube {
@@ -128,7 +128,7 @@ class ZeroSearch {
         const double bound = query_.bound(CubeExpansion(cube), limit());
         if (!(bound < limit())) return;
         const glm::dvec3 point = offerEdges(cube);
-        if (cube.side <= smallestSide) return query_.settle(bound, point);
+        if (cube.side <= minSide) return query_.settle(bound, point);
         if (!(bound < limit())) return;
         visitOctants(cube);
     }

@@ -42,8 +42,8 @@ constexpr float recordedAtRest = 0.5f;  // how long the recording continues afte
 // A resting pile jitters by far less. Bodies that roll as slowly as allowed elsewhere would continue when they are
 // woken.
 constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]
-// at 6 m/s a bunny moves 16 of its voxels in one step; the band must still contain it then [voxels]
-constexpr float bodyInteriorWidth = 20, bowlInteriorWidth = 6;
+// at 6 m/s a bunny moves 16 of its voxels in one step; its interior band must be that wide [voxels]
+constexpr float bodyInteriorVoxels = 20, bowlInteriorVoxels = 6;
 
 // The fraction of friction slip per step that anchors pull back, and the friction factor of resting contacts (see
 // bullet::ShapeOptions), as for wood on wood. With Bullet's 0.2 and a factor of 1, a few bodies that are kept awake
@@ -60,7 +60,7 @@ constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9
 std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
     const glm::mat4 toSize = glm::scale(glm::mat4(1), glm::vec3(bodySize / bounds(kind.mesh).longestSide()));
     return makeThing(transformed(kind.mesh, toSize), {.voxelSize = bodySize / resolution,
-                                                      .interiorWidthVoxels = bodyInteriorWidth,
+                                                      .interiorWidthVoxels = bodyInteriorVoxels,
                                                       .restingFriction = restingFriction});
 }
 
@@ -156,7 +156,7 @@ Outcome bowl(const BowlOptions& options) {
     for (const Kind& kind : options.kinds) things.push_back(bodyOf(kind, float(options.resolution)));
     const float radius = scale * bowlRadius, wall = scale * bowlWall;
     const auto vessel = makeThing(shapes::bowl(radius, wall, 192, bowlOpening, scale * bowlFoot),
-                                  {bowlVoxels * things[0]->field.voxelSize(), bowlInteriorWidth});
+                                  {bowlVoxels * things[0]->field.voxelSize(), bowlInteriorVoxels});
     const std::chrono::duration<double> built = std::chrono::steady_clock::now() - start;
 
     Stage stage(fmt::format("{} bodies in a bowl", options.bodies), {.framesPerMeasuring = 30});

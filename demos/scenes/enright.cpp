@@ -28,9 +28,9 @@ constexpr double period = 3;        // until all bodies should be restored [s]
 constexpr double pi = 3.14159265358979;
 constexpr int sphereLevels = 6;      // the triangles are smaller than the voxels
 constexpr float adaptivity = 0.02f;  // of the recorded surfaces
-constexpr float apart = 1.1f;        // between the two displayed cubes
+constexpr float cubeSpacing = 1.1f;  // between the two displayed cubes
 constexpr double noise = 0.5;        // between the losses of two seeds [% of the volume]
-constexpr float pictured = 0.9f;     // time of the still picture [s]
+constexpr float pictureTime = 0.9f;  // time of the still picture [s]
 
 constexpr Look sphereLook{.colour = 0x3d87b8, .roughness = 0.25f, .clearcoat = 0.6f};
 constexpr Look bunnyLook{.colour = 0xe07a5f, .roughness = 0.25f, .clearcoat = 0.6f};
@@ -123,7 +123,7 @@ void keepFrame(Outcome& outcome, std::vector<Advected>& bodies, double time) {
     outcome.table.rows.push_back(std::move(row));
     // both as seeded by us, side by side
     std::vector<Mesh> surfaces{surfaceOf(*bodies[0].grid, adaptivity), surfaceOf(*bodies[2].grid, adaptivity)};
-    for (glm::vec3& p : surfaces[1].points) p.x += apart;
+    for (glm::vec3& p : surfaces[1].points) p.x += cubeSpacing;
     for (const Mesh& surface : surfaces) outcome.fingerprint = outcome.fingerprint * 31 + hash(surface);
     outcome.recording.frame(time, {}, surfaces);
 }
@@ -160,7 +160,7 @@ Outcome enright(const EnrightOptions& options) {
     outcome.recording.addChanging(sphereLook);
     outcome.recording.addChanging(bunnyLook);
     outcome.recording.view = {
-        .target = {0.5f * (1 + apart), 0.5f, 0.45f}, .distance = 3.2f, .elevation = 0.35f, .moment = pictured};
+        .target = {0.5f * (1 + cubeSpacing), 0.5f, 0.45f}, .distance = 3.2f, .elevation = 0.35f, .moment = pictureTime};
 
     std::vector<Advected> bodies = seeded(*velocity);
     keepFrame(outcome, bodies, 0);

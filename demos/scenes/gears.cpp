@@ -16,9 +16,9 @@
 
 #include <bilayer/collider/mass.h>
 #include <bilayer/sdf/mesh_io.h>
+#include "demos/shared/accumulated_rotation.h"
 #include "demos/shared/gears.h"
 #include "demos/shared/stage.h"
-#include "demos/shared/turning.h"
 #include "integration/bullet/detail/convert.h"
 
 namespace bilayer::demo {
@@ -33,7 +33,7 @@ constexpr float zigzag = 0.4f;    // of the direction from gear to gear [rad]
 // Contact margin, half the backlash; one voxel works too, with five times the contacts [m].
 constexpr float margin = 50e-6f;
 constexpr float settled = 0.1f;         // the backlash is taken up by then [s]
-constexpr float strongest = 100;        // max torque of the motor [loads]
+constexpr float maxTorque = 100;        // max torque of the motor [loads]
 constexpr int framesPerMeasuring = 24;  // teeth are in contact all the time
 constexpr double halfTooth = 0.5;
 
@@ -42,18 +42,18 @@ constexpr int factoryTeeth = 40;
 constexpr float factoryModule = 1e-3f;  // [m]
 constexpr float factoryAxis = 20e-3f;   // position of its bore along x [m]
 constexpr float factoryExtraDistance =
-    0.5e-3f;                   // additional axis distance in the data set, beyond half the diameters [m]
-constexpr double tips = 0.98;  // relative to the max radius: points beyond belong to a tooth's tip
+    0.5e-3f;                        // additional axis distance in the data set, beyond half the diameters [m]
+constexpr double tipRadius = 0.98;  // relative to the max radius: points beyond belong to a tooth's tip
 
 constexpr std::uint32_t colours[] = {0xe07a5f, 0x9db4d6, 0xf2cc8f, 0x81b29a};
 
 struct Wheel {
     btRigidBody& body;
     double ratio;  // of its angle to the first gear's, by the teeth
-    Turning turning;
+    AccumulatedRotation rotation;
     double start = 0;  // angle when settled [rad]
 
-    double angle() const { return turning.angle() - start; }
+    double angle() const { return rotation.angle() - start; }
 };
 
 // Hinges bodies so that they can only rotate about vertical axes, and drives the first. Must be destroyed before their
@@ -76,9 +76,9 @@ class Axles {
         world_.addConstraint(hinges_.back().get());
     }
 
-    /// @param strongest  max impulse per step [N m s]
-    void drive(float speed, float strongest) {
-        hinges_.front()->enableAngularMotor(true, speed, strongest);
+    /// @param maxImpulse  max impulse per step [N m s]
+    void drive(float speed, float maxImpulse) {
+        hinges_.front()->enableAngularMotor(true, speed, maxImpulse);
         hinges_.front()->setJointFeedback(&feedback_);
     }
     // Returns the torque of the last step [N m].
@@ -118,7 +118,7 @@ Train Train::ofFactory(const std::filesystem::path& folder) {
     }
     std::complex<double> sum = 0;  // of the tips, to align all teeth
     for (const glm::vec3& point : mesh.points)
-        if (double(glm::length(glm::vec2(point))) > tips * largest)
+        if (double(glm::length(glm::vec2(point))) > tipRadius * largest)
             sum += std::polar(1.0, factoryTeeth * std::atan2(double(point.y), double(point.x)));
     const glm::quat rotation = glm::angleAxis(-float(std::arg(sum) / factoryTeeth), glm::vec3(0, 0, 1));
     for (glm::vec3& point : mesh.points) point = rotation * point;
@@ -151,7 +151,7 @@ std::vector<Wheel> addTrain(Stage& stage, Axles& axles, Train train, const Gears
         body.setActivationState(DISABLE_DEACTIVATION);
         axles.add(body, place);
         const double sign = i % 2 == 0 ? 1 : -1;
-        wheels.push_back({body, sign * train.parts[0].teeth / part.teeth, Turning(pose.rotation)});
+        wheels.push_back({body, sign * train.parts[0].teeth / part.teeth, AccumulatedRotation(pose.rotation)});
     }
     return wheels;
 }
@@ -181,7 +181,7 @@ Outcome gears(const GearsOptions& options) {
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     Axles axles(stage.world().bullet());
     std::vector<Wheel> wheels = addTrain(stage, axles, std::move(train), options);
-    axles.drive(options.speed, strongest * options.load / options.stepsPerSecond);
+    axles.drive(options.speed, maxTorque * options.load / options.stepsPerSecond);
     const btVector3 brake(0, 0, wheels.back().ratio > 0 ? -options.load : options.load);
 
     std::vector<double> torques;            // of the motor [N m]
@@ -191,7 +191,7 @@ Outcome gears(const GearsOptions& options) {
         stage.step();
         torques.push_back(axles.torque());
         const std::vector<Pose> poses = stage.world().poses();
-        for (std::size_t i = 0; i < wheels.size(); ++i) wheels[i].turning.follow(poses[i].rotation);
+        for (std::size_t i = 0; i < wheels.size(); ++i) wheels[i].rotation.follow(poses[i].rotation);
         const auto off = [&](const Wheel& wheel) {
             return std::abs(wheel.angle() - wheel.ratio * wheels.front().angle());
         };
@@ -200,7 +200,7 @@ Outcome gears(const GearsOptions& options) {
         worstAngle = worse(worstAngle, off(wheels.back()));
     };
     while (stage.time() < settled) step();
-    for (Wheel& wheel : wheels) wheel.start = wheel.turning.angle();
+    for (Wheel& wheel : wheels) wheel.start = wheel.rotation.angle();
     torques.clear();
     worstAngle = worstTooth = 0;
     const double angle = 2 * glm::pi<double>() * options.turns, longest = settled + 2 * angle / options.speed;

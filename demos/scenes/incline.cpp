@@ -84,7 +84,7 @@ std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, floa
         criteria = {{"blocks that should slide and stick", double(stuck), 0},
                     {"acceleration off theory", 100 * worst, 2, "%"}};
     if (sticking > 0) criteria.push_back({"drift of blocks that should stick", drift, maxDrift, "voxels"});
-    if (criteria.empty()) criteria.push_back({"frictions of which theory says nothing, and no other", 1, 0});
+    if (criteria.empty()) criteria.push_back({"only frictions for which theory makes no prediction", 1, 0});
     return criteria;
 }
 

@@ -28,12 +28,12 @@ using openvdb::FloatGrid;
 constexpr float length = 1, width = 0.6f, height = 0.75f, pool = 0.2f;
 constexpr float bunnySize = 0.36f, bunnyHeight = 0.55f;  // longest side; height of its centre [m]
 constexpr float knotRadius = 0.14f, knotThickness = 0.045f, knotHeight = 0.16f;  // [m]
-constexpr float skin = 6;           // half width of the knot's band [voxels]
-constexpr float maxCells = 2;       // max movement of the liquid per step
-constexpr float glass = 0.012f;     // thickness of the tank's walls [m]
-constexpr float glassGap = 0.002f;  // between the liquid and the displayed walls [m]
-constexpr float pictured = 0.4f;    // time of the still picture [s]
-constexpr double fullTurn = 6.283185307;
+constexpr float obstacleHalfWidthVoxels = 6;  // half width of the knot's band [voxels]
+constexpr float maxCells = 2;                 // max movement of the liquid per step
+constexpr float glass = 0.012f;               // thickness of the tank's walls [m]
+constexpr float glassGap = 0.002f;            // between the liquid and the displayed walls [m]
+constexpr float pictureTime = 0.4f;           // time of the still picture [s]
+constexpr double fullAngle = 6.283185307;
 
 constexpr double maxError = 3, maxFinalError = 1;  // of the volume [%]
 constexpr double maxDepth = 0.25;                  // of the liquid's surface inside the knot, anywhere [voxels]
@@ -92,11 +92,12 @@ struct Knot {
     float turns;  // revolutions per second
 
     Pose poseAt(double time) const {
-        return {centre, glm::angleAxis(float(fullTurn * turns * time), glm::vec3(0, 0, 1))};
+        return {centre, glm::angleAxis(float(fullAngle * turns * time), glm::vec3(0, 0, 1))};
     }
     fluid::Solid at(double time, const Tank& tank) const {
-        return fluid::solid(mesh, poseAt(time), *tank.transform,
-                            {.velocity = {{}, {0, 0, float(fullTurn * turns)}}, .halfWidthVoxels = skin});
+        return fluid::solid(
+            mesh, poseAt(time), *tank.transform,
+            {.velocity = {{}, {0, 0, float(fullAngle * turns)}}, .halfWidthVoxels = obstacleHalfWidthVoxels});
     }
     // Returns the distance to the knot, negative inside; far away it is a bound [m].
     double from(const glm::vec3& point, const Pose& pose) const {
@@ -219,7 +220,7 @@ class Scene {
                                    .azimuth = -1.15f,
                                    .elevation = 0.42f,
                                    .groundHeight = tank_.lower().z - glassGap - glass,
-                                   .moment = pictured};
+                                   .moment = pictureTime};
         outcome_.recording.note("cells of liquid", std::to_string(cells_));
         outcome_.recording.note("time per step", fmt::format("{:.0f} ms", outcome_.medianStep()));
         return std::move(outcome_);

@@ -10,9 +10,9 @@
 
 #include <bilayer/collider/mass.h>
 #include <bilayer/sdf/mesh_io.h>
+#include "demos/shared/accumulated_rotation.h"
 #include "demos/shared/stage.h"
 #include "demos/shared/threads.h"
-#include "demos/shared/turning.h"
 
 namespace bilayer::demo {
 namespace {
@@ -80,7 +80,7 @@ struct Rider {
     btRigidBody& body;
     float friction;
     double height;  // at the last step [m]
-    Turning turning;
+    AccumulatedRotation rotation;
     double turns = 0;                  // downward, since the nut has settled
     std::vector<double> heights{};     // after each whole revolution since then, including the start [m]
     double start = 0, speed = 0;       // revolutions, and angular speed [rad/s], when settled
@@ -93,7 +93,7 @@ double spinOf(const btRigidBody& body) {
 }
 
 void settle(Rider& rider) {
-    rider.start = rider.turning.turns();
+    rider.start = rider.rotation.revolutions();
     rider.turns = 0;
     rider.speed = spinOf(rider.body);
     rider.heights = {rider.height};
@@ -108,12 +108,12 @@ void hold(btRigidBody& body) {
     body.setAngularFactor(btVector3(0, 0, 0));
 }
 
-// Stops a nut that has made `most` revolutions.
+// Stops a nut that has made `maxTurns` revolutions.
 void follow(Rider& rider, const Pose& pose, double time, double maxTurns) {
     const bool hasSettled = !rider.heights.empty();
     if (hasSettled && rider.turns >= maxTurns) return;
-    rider.turning.follow(pose.rotation);
-    const double turns = rider.start - rider.turning.turns(), height = pose.position.z;
+    rider.rotation.follow(pose.rotation);
+    const double turns = rider.start - rider.rotation.revolutions(), height = pose.position.z;
     const auto whole = double(rider.heights.size());
     if (hasSettled && turns >= whole)
         rider.heights.push_back(glm::mix(rider.height, height, (whole - rider.turns) / (turns - rider.turns)));
@@ -184,7 +184,7 @@ std::vector<Criterion> criteriaOf(const Verdict& verdict, double deepest, double
         criteria.push_back({"rotation of nuts that should stay", verdict.turned, maxPlay, "degrees"});
         criteria.push_back({"displacement of nuts that should stay", verdict.slipped / voxelSize, 0.5, "voxels"});
     }
-    if (criteria.empty()) criteria.push_back({"frictions of which theory says nothing, and no other", 1, 0});
+    if (criteria.empty()) criteria.push_back({"only frictions for which theory makes no prediction", 1, 0});
     criteria.push_back({"deepest penetration", deepest / voxelSize, 0.5, "voxels"});
     return criteria;
 }
@@ -222,7 +222,7 @@ Outcome nuts(const NutsOptions& options) {
             {.colour = theory.stays(friction) ? stayingColour : runningColour, .roughness = 0.3f, .metalness = 0.4f});
         body.setActivationState(DISABLE_DEACTIVATION);
         body.setGravity(options.weights * body.getGravity());
-        riders.push_back({body, friction, pose.position.z, Turning(pose.rotation)});
+        riders.push_back({body, friction, pose.position.z, AccumulatedRotation(pose.rotation)});
     }
 
     const auto followAll = [&] {

@@ -94,7 +94,7 @@ Outcome spin(const SpinOptions& options) {
     outcome.facts.emplace_back("turned over", fmt::format("{} times", turns));
     outcome.criteria = {{"drift of angular momentum a minute", 100 * drift * 60 / stage.time(), 1, "%"},
                         {"did not turn over", double(turns == 0), 0},
-                        {"mass and inertia of the field off",
+                        {"error of the field's mass and inertia",
                          100 * difference(massProperties(thing->field), massProperties(thing->mesh)), 0.5, "%"}};
     return outcome;
 }

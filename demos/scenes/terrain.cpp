@@ -193,8 +193,8 @@ Outcome terrain(const TerrainOptions& options) {
     Outcome outcome =
         stage.finish({.target = {0, 0, 0}, .distance = 9, .azimuth = -1.1f, .elevation = 0.45f, .groundHeight = -0.4f});
     outcome.facts = std::move(facts);
-    outcome.criteria = {{"speed off a point's without friction", worst, maxSpeedError, "%"},
-                        {"contacts off the ground's normals", double(ghosts), 0},
+    outcome.criteria = {{"error of the speed, against a frictionless point", worst, maxSpeedError, "%"},
+                        {"contacts with normals unlike the ground's", double(ghosts), 0},
                         {"deepest overlap", outcome.deepest() / options.voxelSize, maxPenetration, "voxels"},
                         {"rise of energy", outcome.energies.rise(), maxEnergyRise}};
     return outcome;

@@ -48,15 +48,15 @@ struct ExtensionOptions {
     bool restStabilisation = false;
 
     /// Smooth ground: bodies with a field keep their energy when they slide or roll over the shallow edges of static
-    /// triangle meshes and height fields, as over the smooth surface that the triangles stand for. At each edge with a
-    /// turn of angle t, an impact without a bounce takes the fraction sin^2(t) of a body's kinetic energy: a block that
-    /// slides over waves of 0.1 m on cells of its own size loses up to 73 % of its speed in 3 s. At the end of each
-    /// step, the linear velocity gets back what the step's impulses have taken.
+    /// triangle meshes and height fields, as over the smooth surface that the triangles stand for. At each edge whose
+    /// faces differ by an angle t, an impact without a bounce takes the fraction sin^2(t) of a body's kinetic energy: a
+    /// block that slides over waves of 0.1 m on cells of its own size loses up to 73 % of its speed in 3 s. At the end
+    /// of each step, the linear velocity gets back what the step's impulses have taken.
     ///
-    /// - Edges with a turn of less than 20 degrees count: the sharpest one of the ground under the body, the sharpest
+    /// - Edges whose faces differ by less than 20 degrees count: the sharpest one of the ground below, the sharpest
     ///   one of the body's own triangle at the contact, and for a body with such edges its rotation in a step. Impacts
-    ///   get back up to four times the energy that an edge with these turns in all can take at the body's speed. So a
-    ///   drop on the ground is an impact as usual, and a flat floor gives nothing back to a box.
+    ///   get back up to four times the energy that an edge with the sum of these angles can take at the body's speed.
+    ///   So a drop on the ground is an impact as usual, and a flat floor gives nothing back to a box.
     /// - A body that is slower along the ground than gravity accelerates it in two steps gets nothing.
     /// - The kinetic energy of a body changes by a fifth in a step at most.
     /// - Contacts, normals and positions of the step stay as they are.

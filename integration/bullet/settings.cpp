@@ -33,7 +33,7 @@ constexpr float maxIndex = 1e9f;   // maximum coordinate of a field [voxels]
 // are cheaper than more voxels.
 constexpr int minInterior = 3, maxInterior = 10;
 // Points are followed along straight paths. The error is 3 % of a body's radius at this rotation in a step [rad].
-constexpr float straightTurn = 0.5f;
+constexpr float maxRotationPerStep = 0.5f;
 // Beyond the middle of a wall, a point is pushed out on the far side.
 constexpr float wallPart = 0.5f;
 // Minimum body size [m]. Bullet's thresholds are absolute lengths and speeds: gContactBreakingThreshold is 2 cm, and
@@ -55,16 +55,17 @@ void requireSensible(const MeshReport& mesh, const SceneRequirements& scene) {
           std::tuple("margin", std::max(scene.margin, -1.f), -1.f)})
         if (!(value >= minimum && std::isfinite(value)))
             throw std::invalid_argument(
-                fmt::format("advice: a {} of {}; it must be finite, and {} at least", name, value, minimum));
+                fmt::format("recommendSettings: a {} of {}; it must be finite, and {} at least", name, value, minimum));
     if (scene.voxelSize > 0 && scene.voxelSize < minVoxelSize)
         throw std::invalid_argument(
-            fmt::format("advice: a voxel size of {}; no field has voxels below {:g}: scale the mesh up",
+            fmt::format("recommendSettings: a voxel size of {}; no field has voxels below {:g}: scale the mesh up",
                         scene.voxelSize, minVoxelSize));
     if (scene.voxelSize > 0 && mesh.bounds.longestSide() / scene.voxelSize > maxIndex)
-        throw std::invalid_argument(fmt::format(
-            "advice: a voxel size of {}; no field has more than {:g} voxels in a row", scene.voxelSize, maxIndex));
+        throw std::invalid_argument(
+            fmt::format("recommendSettings: a voxel size of {}; no field has more than {:g} voxels in a row",
+                        scene.voxelSize, maxIndex));
     if (mesh.triangles == 0 || !(mesh.bounds.longestSide() > 0))
-        throw std::invalid_argument("advice: the mesh has no extent");
+        throw std::invalid_argument("recommendSettings: the mesh has no extent");
 }
 
 int wholeFrom(float value) {
@@ -81,15 +82,16 @@ float chosenVoxel(const SceneRequirements& scene, float longestSide, float wall)
 
 // Estimates from area and volume, exact to first order in the curvature. Leaves are counted on both sides of the
 // surface, so that walls thinner than a leaf need as little as half of the memory.
-void estimate(const MeshReport& mesh, Settings& advice) {
-    const double h = advice.voxelSize, area = mesh.area / (h * h), volume = std::abs(mesh.volume) / (h * h * h);
-    double inside = area * advice.interiorWidthVoxels;
+void estimate(const MeshReport& mesh, Settings& settings) {
+    const double h = settings.voxelSize, area = mesh.area / (h * h), volume = std::abs(mesh.volume) / (h * h * h);
+    double inside = area * settings.interiorWidthVoxels;
     if (mesh.closed()) inside = std::min(inside, volume);
-    const double voxels = area * advice.exteriorWidthVoxels + inside;
-    const double blocks = area * (advice.exteriorWidthVoxels + advice.interiorWidthVoxels + blockWidth) / blockVoxels;
-    advice.voxels = std::uint64_t(voxels);
-    advice.fieldBytes = std::uint64_t(blocks * blockBytes);
-    advice.buildSeconds = secondsPerTriangle * double(mesh.triangles) + secondsPerVoxel * voxels;
+    const double voxels = area * settings.exteriorWidthVoxels + inside;
+    const double blocks =
+        area * (settings.exteriorWidthVoxels + settings.interiorWidthVoxels + blockWidth) / blockVoxels;
+    settings.voxels = std::uint64_t(voxels);
+    settings.fieldBytes = std::uint64_t(blocks * blockBytes);
+    settings.buildSeconds = secondsPerTriangle * double(mesh.triangles) + secondsPerVoxel * voxels;
 }
 
 void warnOfMesh(const MeshReport& mesh, std::vector<std::string>& warnings) {
@@ -102,40 +104,43 @@ void warnOfMesh(const MeshReport& mesh, std::vector<std::string>& warnings) {
         warnings.push_back(fmt::format("the mesh is not clean: {}", verdict(mesh)));
 }
 
-void warnOfSizes(const MeshReport& mesh, const SceneRequirements& scene, const Settings& advice,
+void warnOfSizes(const MeshReport& mesh, const SceneRequirements& scene, const Settings& settings,
                  std::vector<std::string>& warnings) {
-    const float thinnest = mesh.thinnestWall / advice.voxelSize;
-    if (advice.wallVoxels > 0 && advice.wallVoxels < minWallVoxels - rounding)
+    const float thinnest = mesh.thinnestWall / settings.voxelSize;
+    if (settings.wallVoxels > 0 && settings.wallVoxels < minWallVoxels - rounding)
         warnings.push_back(fmt::format(
             "walls are {:.2g} voxels thick: below {:g}, contacts may come out on the far side and mass is lost",
-            advice.wallVoxels, minWallVoxels));
+            settings.wallVoxels, minWallVoxels));
     else if (thinnest > 0 && thinnest < minWallVoxels)
         warnings.push_back(fmt::format(
-            "the thinnest place, a tip or a crease, has {:.2g} voxels: contacts there are coarse", thinnest));
-    if (const float gap = scene.gap / advice.voxelSize; gap > 0 && gap < gapVoxels - rounding)
+            "the thinnest part, a convex vertex or a sharp edge, has {:.2g} voxels: contacts there are coarse",
+            thinnest));
+    if (const float gap = scene.gap / settings.voxelSize; gap > 0 && gap < gapVoxels - rounding)
+        warnings.push_back(fmt::format(
+            "the gap is {:.2g} voxels wide: below {:g}, a body that rests in it penetrates its sides", gap, gapVoxels));
+    if (settings.margin == 0)
         warnings.push_back(
-            fmt::format("the gap is {:.2g} voxels wide: below {:g}, bodies at rest overlap in it", gap, gapVoxels));
-    if (advice.margin == 0) warnings.push_back("without a margin, contacts of what rests come and go");
-    if (advice.margin > advice.voxelSize * float(maxInterior))
-        warnings.push_back(fmt::format("the margin is {:.2g} voxels: the band outside has to reach as far",
-                                       advice.margin / advice.voxelSize));
-    if (double(advice.fieldBytes) > maxMemory)
-        warnings.push_back(fmt::format("the field takes about {:.1f} GiB", double(advice.fieldBytes) / maxMemory));
+            "without a margin, resting contacts appear and disappear from step to step: set one of a voxel");
+    if (settings.margin > settings.voxelSize * float(maxInterior))
+        warnings.push_back(fmt::format("the margin is {:.2g} voxels: the exterior band must be at least as wide",
+                                       settings.margin / settings.voxelSize));
+    if (double(settings.fieldBytes) > maxMemory)
+        warnings.push_back(fmt::format("the field takes about {:.1f} GiB", double(settings.fieldBytes) / maxMemory));
 }
 
-void warnOfMotion(const SceneRequirements& scene, const Settings& advice, float stepLength,
+void warnOfMotion(const SceneRequirements& scene, const Settings& settings, float stepLength,
                   std::vector<std::string>& warnings) {
-    if (advice.substepsWithoutSpeculation > advice.substeps || advice.substeps == maxSubsteps)
+    if (settings.substepsWithoutSpeculation > settings.substeps || settings.substeps == maxSubsteps)
         warnings.push_back(
-            fmt::format("a step goes {:.3g} m, farther than half of a wall: impacts throw bodies through what is thin "
-                        "unless a bullet::WorldExtensions looks after the world; without it and without swept contacts "
-                        "(ShapeOptions::speculative) that needs {} substeps{}",
-                        stepLength, advice.substepsWithoutSpeculation,
-                        advice.substepsWithoutSpeculation < maxSubsteps ? "" : " or more"));
+            fmt::format("a body moves {:.3g} m in a step, more than half of a wall, and may tunnel: use "
+                        "bullet::WorldExtensions; without it and without speculative contacts "
+                        "(ShapeOptions::speculative), take {} substeps{}",
+                        stepLength, settings.substepsWithoutSpeculation,
+                        settings.substepsWithoutSpeculation < maxSubsteps ? "" : " or more"));
     if (scene.massRatio > maxMassRatio)
         warnings.push_back(
-            fmt::format("masses of {:.3g} to 1: above {:g} to 1 the solver leaves what lies below "
-                        "squeezed; take more substeps, not more iterations",
+            fmt::format("masses of {:.3g} to 1: above {:g} to 1 the solver lets the heavy body penetrate "
+                        "the light one below it; take more substeps, not more iterations",
                         scene.massRatio, maxMassRatio));
 }
 
@@ -155,28 +160,29 @@ Settings recommendSettings(const MeshReport& mesh, const SceneRequirements& scen
     const float longestSide = mesh.bounds.longestSide();
     const float wall = scene.thickness > 0 && mesh.commonWall > 0 ? std::min(scene.thickness, mesh.commonWall)
                                                                   : std::max(scene.thickness, mesh.commonWall);
-    Settings advice;
-    const float h = advice.voxelSize = chosenVoxel(scene, longestSide, wall);
-    advice.margin = scene.margin < 0 ? h : scene.margin;
-    advice.wallVoxels = wall / h;
-    advice.splitImpulse = -h;
+    Settings settings;
+    const float h = settings.voxelSize = chosenVoxel(scene, longestSide, wall);
+    settings.margin = scene.margin < 0 ? h : scene.margin;
+    settings.wallVoxels = wall / h;
+    settings.splitImpulse = -h;
 
     const float stepLength = scene.speed * scene.step;
     // an impact at one end stops that end; the linear velocity becomes rotation about it
     const float spin = scene.spin < 0 ? 2 * scene.speed / longestSide : scene.spin;
-    advice.substeps = std::max(1, wholeFrom(spin * scene.step / straightTurn));
+    settings.substeps = std::max(1, wholeFrom(spin * scene.step / maxRotationPerStep));
     const float deepest = wallPart * (wall > 0 ? wall : longestSide);
-    advice.substepsWithoutSpeculation = std::max(advice.substeps, wholeFrom(stepLength / deepest));
-    advice.exteriorWidthVoxels = std::max(1, wholeFrom(advice.margin / h + bilayer::detail::cellDiagonal));
-    advice.interiorWidthVoxels = std::clamp(
-        wholeFrom(stepLength / (float(advice.substeps) * h) + bilayer::detail::cellDiagonal), minInterior, maxInterior);
-    estimate(mesh, advice);
+    settings.substepsWithoutSpeculation = std::max(settings.substeps, wholeFrom(stepLength / deepest));
+    settings.exteriorWidthVoxels = std::max(1, wholeFrom(settings.margin / h + bilayer::detail::cellDiagonal));
+    settings.interiorWidthVoxels =
+        std::clamp(wholeFrom(stepLength / (float(settings.substeps) * h) + bilayer::detail::cellDiagonal), minInterior,
+                   maxInterior);
+    estimate(mesh, settings);
 
-    warnOfMesh(mesh, advice.warnings);
-    warnOfSizes(mesh, scene, advice, advice.warnings);
-    warnOfMotion(scene, advice, stepLength, advice.warnings);
-    warnOfBullet(longestSide, advice.warnings);
-    return advice;
+    warnOfMesh(mesh, settings.warnings);
+    warnOfSizes(mesh, scene, settings, settings.warnings);
+    warnOfMotion(scene, settings, stepLength, settings.warnings);
+    warnOfBullet(longestSide, settings.warnings);
+    return settings;
 }
 
 }  // namespace bilayer::bullet

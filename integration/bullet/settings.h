@@ -41,7 +41,7 @@ struct Settings {
     /// approximate size of the Field in memory [bytes]; a thin body may take as little as half of it
     std::uint64_t fieldBytes = 0;
     double buildSeconds = 0;            ///< approximate, on two cores of 2023 [s]
-    std::vector<std::string> warnings;  ///< what to expect in spite of these settings, a sentence each
+    std::vector<std::string> warnings;  ///< problems to expect with these settings, a sentence each
 };
 
 /// Recommends settings for a body from its mesh. Throws std::invalid_argument that names any value that is not

@@ -9,6 +9,7 @@
 #include <BulletCollision/CollisionShapes/btUniformScalingShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 #include <LinearMath/btAabbUtil2.h>
+#include <fmt/format.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -270,7 +271,8 @@ void Shape::setLocalScaling(const btVector3& scaling) {
 }
 
 void Shape::setMargin(btScalar margin) {
-    if (!(margin >= 0) || !std::isfinite(margin)) throw std::invalid_argument("Shape: a margin is at least 0");
+    if (!(margin >= 0) || !std::isfinite(margin))
+        throw std::invalid_argument(fmt::format("Shape: the margin is {}; it must be finite and at least 0", margin));
     m_collisionMargin = margin;
 }
 

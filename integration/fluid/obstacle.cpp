@@ -30,8 +30,8 @@ using openvdb::Vec3SGrid;
 using openvdb::Vec3STree;
 using openvdb::math::Transform;
 
-constexpr float maxHalfWidth = 1000;    // [voxels]
-constexpr double axisTolerance = 1e-9;  // tolerance of a cosine of 1
+constexpr float maxHalfWidthVoxels = 1000;  // [voxels]
+constexpr double axisTolerance = 1e-9;      // tolerance of a cosine of 1
 // The number of a corner has bit 4 for the upper x, 2 for y, 1 for z. Each tetrahedron runs from corner 0 to corner 7
 // along three edges, in one of the orders of the axes.
 constexpr int tetrahedra[6][4] = {{0, 4, 6, 7}, {0, 4, 5, 7}, {0, 2, 6, 7}, {0, 2, 3, 7}, {0, 1, 5, 7}, {0, 1, 3, 7}};
@@ -180,7 +180,7 @@ void check(const SolidOptions& options, const Transform& cells) {
     }
     const float lengths = glm::length(options.velocity.linear) + glm::length(options.velocity.angular);
     if (!std::isfinite(lengths)) throw std::invalid_argument("the velocity is not finite");
-    if (!(options.halfWidthVoxels >= minHalfWidth && options.halfWidthVoxels <= maxHalfWidth))
+    if (!(options.halfWidthVoxels >= minHalfWidthVoxels && options.halfWidthVoxels <= maxHalfWidthVoxels))
         throw std::invalid_argument(
             fmt::format("halfWidthVoxels must be in 3..1000, not {:g}", options.halfWidthVoxels));
 }
@@ -199,7 +199,7 @@ Solid solidOf(const Body& body, const Placement& placement, const Transform& cel
     solid.distance = regrid(body, placement, cells, options.halfWidthVoxels * voxel, halfOf(options.progress, 0));
     solid.distance->setName("solid");
     const auto corners =
-        regrid(body, placement, *cornersOf(cells), minHalfWidth * voxel, halfOf(options.progress, 0.5f));
+        regrid(body, placement, *cornersOf(cells), minHalfWidthVoxels * voxel, halfOf(options.progress, 0.5f));
     addFluidFractions(solid, *corners, cells);
     addVelocity(solid, options.velocity, placement.pose.position);
     return solid;

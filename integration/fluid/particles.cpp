@@ -52,7 +52,7 @@ std::uint64_t voxelKey(std::uint64_t seed, const Coord& voxel) {
 }
 
 // A point in the unit cube around the origin.
-Vec3d jitter(std::uint64_t bits) {
+Vec3d randomOffset(std::uint64_t bits) {
     const auto part = [&](int axis) {
         const std::uint64_t mask = (1u << jitterBits) - 1;
         return (double((bits >> (axis * jitterBits)) & mask) + 0.5) / (1u << jitterBits) - 0.5;
@@ -86,7 +86,7 @@ std::vector<Coord> blocks(const FloatGrid& liquid) {
 template <class Visit>
 void visitVoxel(const Coord& voxel, const ParticleOptions& options, Visit&& visit) {
     const std::uint64_t key = voxelKey(options.seed, voxel);
-    for (int i = 0; i < options.perVoxel; ++i) visit(voxel.asVec3d() + jitter(mix(key + std::uint64_t(i))));
+    for (int i = 0; i < options.perVoxel; ++i) visit(voxel.asVec3d() + randomOffset(mix(key + std::uint64_t(i))));
 }
 
 // Rounds to single precision. Not inlined: GCC 12 would leave out the rounding in values computed from it (x and y at
@@ -164,7 +164,7 @@ class Body {
         const float reach = float(side) * reach_;
         // with a mesh, the inside is the mesh's, and the samples may differ from it; without one it is that of the
         // samples
-        return distance <= (field_.mesh() ? reach + error_ : steepestInterpolant * reach);
+        return distance <= (field_.mesh() ? reach + error_ : maxInterpolantSlope * reach);
     }
 
     bool contains(const glm::vec3& point) const { return field_.inside(toBody(point)); }

@@ -32,7 +32,7 @@ constexpr float rounding = 1e-5f;  // tolerance of a half width that is a whole 
 void requireLiquid(const FloatGrid& liquid) {
     if (liquid.getGridClass() != openvdb::GRID_LEVEL_SET) refuse("the liquid's grid is no level set");
     if (!liquid.transform().isLinear() || !liquid.hasUniformVoxels()) refuse("the liquid's voxels are not cubes");
-    if (!(liquid.background() >= minHalfWidth * liquid.voxelSize()[0] * (1 - rounding)))
+    if (!(liquid.background() >= minHalfWidthVoxels * liquid.voxelSize()[0] * (1 - rounding)))
         refuse("the liquid's band is narrower than 3 voxels");
     if (!std::isfinite(liquid.background())) refuse("the liquid's background is not finite");
     // all of OpenVDB's checks except those of the gradient, which is repaired, and of the width, whose last bit may
@@ -79,7 +79,7 @@ SeedReport seedWith(FloatGrid& liquid, const FloatGrid::Ptr& band, SeedMode mode
     const FloatGrid::Ptr result = combined(liquid, band, mode);
     const Changes changes = repair(*result);
     if (mode == SeedMode::unite && !(result->tree().getValue(core) < 0))
-        refuse("the body is too small for these voxels: nothing of it would be left");
+        refuse("the body is too small for these voxels: the result would have no voxel inside it");
     liquid.setTree(result->treePtr());
     const openvdb::Vec3d where = liquid.indexToWorld(changes.where);
     return {changes.largest, {where.x(), where.y(), where.z()}, changes.voxels};

@@ -63,11 +63,11 @@ struct SeedReport {
 /// The grid's voxel size and background stay the same to the bit. It gets a new tree; accessors and tree pointers from
 /// before keep referring to the old one.
 ///
-/// The result is a true level set: openvdb::tools::checkLevelSet finds no fault in it. (One exception: it reports a
-/// background "less than 3 voxel units" where the caller's is so by its last bit, as that of createLevelSet(0.02, 3)
-/// is.) Distances from the mesh are exact (regrid.h). Where bodies meet, they are those of OpenVDB's CSG. Next to
-/// creases, walls and gaps below a voxel, they are changed by fractions of a voxel if that check needs it; SeedReport
-/// states how far.
+/// The result is a true level set: openvdb::tools::checkLevelSet finds no fault in it. (One exception: it may
+/// report a background "less than 3 voxel units" because the caller's background is smaller by its last bit, as that of
+/// createLevelSet(0.02, 3) is.) Distances from the mesh are exact (regrid.h). Where bodies meet, they are those of
+/// OpenVDB's CSG. Next to creases, walls and gaps below a voxel, they are changed by fractions of a voxel if that check
+/// needs it; SeedReport states how far.
 ///
 /// Throws std::invalid_argument if the grid is no level set, its voxels are not cubes, or its band is narrower than 3
 /// voxels, and for everything that regrid() refuses. Throws std::runtime_error if no level set of this voxel size could

@@ -6,7 +6,7 @@
 namespace bilayer::detail {
 
 /// Returns the smallest of the physical memory, the process's limit of address space, and the limits of its control
-/// groups, as containers set them at the first call [bytes].
+/// groups, as containers set them [bytes]. They are read at the first call.
 double usableMemory();
 
 }  // namespace bilayer::detail

@@ -23,7 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 constexpr float roundUp = 1 + 1e-6f;
 /// The max coordinate and the max reach of a search [voxels]. Their squares are finite. Unused boxes are infinitely far
 /// away and therefore stay out of reach.
-constexpr float farthestPlace = 1e18f, longestReach = 4e18f;
+constexpr float maxCoordinate = 1e18f, maxReach = 4e18f;
 
 inline Vec square(Vec x) {
     return hn::Mul(x, x);

@@ -21,10 +21,11 @@ constexpr std::size_t grain = 1024;  // leaves or triangles per task
 constexpr double roundingOfBoxes = 1e-12;
 /// Minimum speed of a line along an axis: with it, the line stays between two planes for longer than any box is wide.
 constexpr double minSpeed = 1e-30;
-/// Count of leaves that tell how much the boxes overlap, and max count of the leaves that one of them meets.
+/// Count of leaves that are sampled to estimate how much boxes overlap, and max count of the leaves that one meets.
 constexpr std::size_t maxSamples = 256, maxMet = 4096;
-/// A leaf of a plain surface meets about ten leaves. Where it meets more than this, oriented boxes pay.
-constexpr std::size_t crowd = 64;
+/// A leaf of a smooth surface meets about ten leaves. Where it meets more than this, oriented boxes are worth their
+/// cost.
+constexpr std::size_t maxOverlaps = 64;
 
 TreeItem itemOf(const Mesh& mesh, unsigned triangle) {
     const glm::uvec3& t = mesh.triangles[triangle];
@@ -135,7 +136,7 @@ class LineSearch {
 
 }  // namespace
 
-// Whether boxes of leaves overlap much more than those of a plain surface do, judged by a sample of them.
+// Whether boxes of leaves overlap much more than those of a smooth surface do, judged by a sample of them.
 bool TriangleTree::isCrowded() const {
     std::size_t samples = 0, met = 0;
     for (std::size_t leaf = 0; leaf < leaves_.size(); leaf += 1 + leaves_.size() / maxSamples) {
@@ -158,7 +159,7 @@ bool TriangleTree::isCrowded() const {
         met += count;
         ++samples;
     }
-    return met > crowd * samples;
+    return met > maxOverlaps * samples;
 }
 
 TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh), count_(mesh.triangles.size()) {

@@ -21,7 +21,7 @@ namespace bilayer::detail {
 namespace {
 
 /// Floats represent all integers up to twice this [voxels].
-constexpr double longestMesh = 1 << 23;
+constexpr double maxMeshVoxels = 1 << 23;
 constexpr std::size_t grain = 1024;  // triangles or leaves per task
 
 struct DoubleBounds {
@@ -244,7 +244,7 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, con
     const glm::dvec3 lower = glm::dvec3(box.lower) / double(voxelSize),
                      upper = glm::dvec3(box.upper) / double(voxelSize);
     const glm::dvec3 base = 8.0 * glm::floor(lower / 8.0), size = glm::floor(upper - base) + 1.0;
-    if (!(std::max({size.x, size.y, size.z}) <= longestMesh))
+    if (!(std::max({size.x, size.y, size.z}) <= maxMeshVoxels))
         throw std::invalid_argument("voxelSize is too small: the mesh is longer than 2^23 voxels");
     WideTree tree;
     tree.base = glm::ivec3(base);

@@ -21,7 +21,7 @@ namespace bilayer::detail {
 /// A box of bricks, cubes of 2^shift voxels a side.
 class BrickLattice {
   public:
-    static constexpr int smallestShift = 5;      ///< at least 32 voxels a side: their data fits a core's own cache
+    static constexpr int minShift = 5;           ///< at least 32 voxels a side: their data fits a core's own cache
     static constexpr double maxCells = 1 << 22;  ///< max brick count, 16 MiB of counters; larger boxes, larger bricks
 
     /// @param box    bounds of the mesh
@@ -29,7 +29,7 @@ class BrickLattice {
     BrickLattice(const Bounds& box, double voxelsPerUnit, double reach) : reach_(reach) {
         const glm::dvec3 lower = glm::dvec3(box.lower) * voxelsPerUnit - reach,
                          upper = glm::dvec3(box.upper) * voxelsPerUnit + reach;
-        for (shift = smallestShift;; ++shift) {
+        for (shift = minShift;; ++shift) {
             first = floorToInt(lower) >> shift;
             size = (floorToInt(upper) >> shift) - first + 1;
             if (double(size.x) * double(size.y) * double(size.z) <= maxCells) return;

@@ -14,7 +14,7 @@ constexpr double smallRadius = 1.6;
 /// Maximum cell count, 4 MiB of counters. Above it, the pieces of a brick are not grouped.
 constexpr double maxCells = 1 << 20;
 /// Cell side as a multiple of the mean piece radius, and its limits. Measured to be the fastest [voxels].
-constexpr float cellFactor = 4.f, smallestCell = 1.1f, largestCell = 3.f;
+constexpr float cellFactor = 4.f, minCellSide = 1.1f, maxCellSide = 3.f;
 /// Rounding of a cluster's own values [voxels].
 constexpr float clusterSlack = 1e-4f;
 
@@ -35,7 +35,7 @@ void Clusters::build(std::span<const Piece> pieces, const glm::ivec3& origin) {
         upper = glm::max(upper, sample);
     }
     const float meanRadius = float(radii / double(pieces.size()));
-    const Cells cells(lower, upper, std::clamp(cellFactor * meanRadius, smallestCell, largestCell));
+    const Cells cells(lower, upper, std::clamp(cellFactor * meanRadius, minCellSide, maxCellSide));
     const bool grouped = radii < smallRadius * double(pieces.size()) && cells.count() <= maxCells;
     if (!grouped) {
         for (std::uint32_t i = 0; i < members_.size(); ++i)

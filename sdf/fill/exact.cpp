@@ -27,7 +27,7 @@ namespace {
 
 /// Maximum edge length of a piece [voxels]. Longer edges are halved, so that a piece stays near the blocks that query
 /// it and floats resolve its frame.
-constexpr double longestPieceEdge = 16;
+constexpr double maxPieceEdge = 16;
 /// Maximum count of paths that are tried before the winding number of the whole mesh.
 constexpr int maxPaths = 16;
 
@@ -107,7 +107,7 @@ class ExactBrickFiller {
     void cut(std::size_t brick) {
         s_.pieces.clear();
         const TriangleLimits limits = limitsOfWanted();
-        PieceCutter cutter(longestPieceEdge, s_.pieces);
+        PieceCutter cutter(maxPieceEdge, s_.pieces);
         detail::forEachTriangle(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit_,
                                 [&](std::uint32_t triangle, const TriangleCorners& corners) {
                                     if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();

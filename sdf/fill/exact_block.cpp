@@ -43,7 +43,7 @@ void applySamples(const BlockInput& input, BlockDistances& block) {
     const ChunkIntTag intTag;
     const ChunkVec reach2 = hn::Set(tag, square(input.reach));
     for (int i = 0; i < blockVoxels; i += chunkVoxels) hn::Store(reach2, tag, block.nearest2 + i);
-    for (const std::uint32_t index : input.reaching)
+    for (const std::uint32_t index : input.reachingClusters)
         applySample(input.clusters[index].sample - input.inBrick, input.reach, block);
     for (int i = 0; i < blockVoxels; i += chunkVoxels) {
         const ChunkVec raised =
@@ -83,7 +83,7 @@ inline void applyMembers(const BlockInput& input, const Cluster& cluster, const 
 }
 
 void applyPieces(const BlockInput& input, BlockDistances& block) {
-    for (const std::uint32_t index : input.reaching) {
+    for (const std::uint32_t index : input.reachingClusters) {
         const Cluster& cluster = input.clusters[index];
         const glm::vec3 sample = cluster.sample - input.inBrick;
         const BoundingCylinder cylinder(sample, cluster.radius, cluster.normal, cluster.thickness);

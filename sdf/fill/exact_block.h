@@ -38,7 +38,7 @@ struct ClusterMember {
 
 /// The clusters and pieces that reach a block.
 struct BlockInput {
-    std::span<const std::uint32_t> reaching;  ///< indices into `clusters`
+    std::span<const std::uint32_t> reachingClusters;  ///< indices into `clusters`
     const Cluster* clusters;
     const ClusterMember* members;
     const Piece* pieces;

@@ -179,17 +179,17 @@ class TileCutter {
         const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
         const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
         for (const TriangleCorners& half : {TriangleCorners{c[i], middle, c[k]}, TriangleCorners{middle, c[j], c[k]}})
-            goOn(half, 0.5 * area, longestEdge2(half), next);
+            recurseOn(half, 0.5 * area, longestEdge2(half), next);
     }
 
     void quarter(const TriangleCorners& c, double area, double longest2, Next next) {
         const glm::dvec3 ab = 0.5 * (c[0] + c[1]), bc = 0.5 * (c[1] + c[2]), ca = 0.5 * (c[2] + c[0]);
         for (const TriangleCorners& part : {TriangleCorners{c[0], ab, ca}, TriangleCorners{ab, c[1], bc},
                                             TriangleCorners{ca, bc, c[2]}, TriangleCorners{ab, bc, ca}})
-            goOn(part, 0.25 * area, 0.25 * longest2, next);
+            recurseOn(part, 0.25 * area, 0.25 * longest2, next);
     }
 
-    void goOn(const TriangleCorners& c, double area, double longest2, Next next) {
+    void recurseOn(const TriangleCorners& c, double area, double longest2, Next next) {
         if (!limits_ || !misses(c, *limits_)) (this->*next)(c, area, longest2);
     }
 

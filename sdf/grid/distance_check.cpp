@@ -19,7 +19,7 @@ namespace bilayer::detail {
 namespace {
 
 /// Limit of voxel coordinates: sums of a few coordinates still fit in an int.
-constexpr std::int32_t farthestVoxel = 1 << 30;
+constexpr std::int32_t maxVoxelCoordinate = 1 << 30;
 
 /// Checks all distances of a level set.
 class DistanceCheck {
@@ -71,7 +71,7 @@ class DistanceCheck {
     void checkPlaces() const {
         const openvdb::CoordBBox box = grid_.evalActiveVoxelBoundingBox();
         for (int axis = 0; axis < 3; ++axis)
-            if (box.min()[axis] < -farthestVoxel || box.max()[axis] > farthestVoxel)
+            if (box.min()[axis] < -maxVoxelCoordinate || box.max()[axis] > maxVoxelCoordinate)
                 refuse("has voxels farther than 2^30 voxels from its origin");
     }
 

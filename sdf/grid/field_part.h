@@ -14,7 +14,7 @@
 
 namespace bilayer::detail {
 
-/// What a part must know of the whole. The boxes end at borders of bricks, or at `unbounded` where no part follows.
+/// What a part needs of the whole field. The boxes end at borders of bricks, or at `unbounded` where no part follows.
 struct FieldPart {
     Bounds mesh;             ///< bounds of the whole mesh
     std::uint64_t meshHash;  ///< of the whole mesh; 0: not known

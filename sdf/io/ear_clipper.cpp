@@ -206,7 +206,7 @@ bool EarClipper::finish(unsigned v, std::vector<glm::uvec3>& triangles) {
 }
 
 // Cuts repeated corners and outward spikes, as far as cuts have made some. Where they remain, parts of the outline lie
-// next to each other with nothing in between, and ears there cannot be told from their surroundings.
+// next to each other with nothing in between, and ears there cannot be distinguished from their surroundings.
 void EarClipper::cutEmpty(std::vector<glm::uvec3>& triangles) {
     while (!changed_.empty()) {
         const unsigned v = changed_.back(), next = corners_[v].after;

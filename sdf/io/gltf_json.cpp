@@ -16,8 +16,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t longestQuote = 40;  // [bytes]
-constexpr int maxNesting = 200;           // of objects and arrays; tinygltf recurses once per level
+constexpr std::size_t maxQuoteBytes = 40;  // [bytes]
+constexpr int maxNesting = 200;            // of objects and arrays; tinygltf recurses once per level
 
 void checkNesting(std::string_view text) {
     int depth = 0;
@@ -273,8 +273,8 @@ void check(json& object, const std::vector<GltfMember>& members, const std::stri
 }  // namespace
 
 std::string excerpt(std::string_view text) {
-    if (text.size() <= longestQuote) return std::string(text);
-    std::size_t end = longestQuote;
+    if (text.size() <= maxQuoteBytes) return std::string(text);
+    std::size_t end = maxQuoteBytes;
     while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;  // inside a UTF-8 character
     return std::string(text.substr(0, end)) + " ...";
 }

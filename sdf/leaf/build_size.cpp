@@ -78,7 +78,7 @@ void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& o
     double cubes = 1;
     for (int axis = 0; axis < 3; ++axis) {
         const double low = double(box.lower[axis]) / h, high = double(box.upper[axis]) / h;
-        if (!(std::abs(low) < farthestIndex && std::abs(high) < farthestIndex))
+        if (!(std::abs(low) < maxIndexCoordinate && std::abs(high) < maxIndexCoordinate))
             refuse("index coordinates would leave 32 bits");
         cubes *= (high - low + 2 * double(reach)) / countedSide + 2;
     }

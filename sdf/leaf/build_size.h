@@ -9,7 +9,7 @@
 namespace bilayer::detail {
 
 /// Limit of index coordinates: well within 32 bits, with room for the band [voxels].
-inline constexpr double farthestIndex = 1e9;
+inline constexpr double maxIndexCoordinate = 1e9;
 
 /// Bounds and area of a mesh.
 struct MeshExtent {

@@ -66,7 +66,7 @@ SignLinks findSignLinks(const float* distances) {
     return HWY_DYNAMIC_DISPATCH(linksOf)(distances);
 }
 
-void spread(const SignLinks& links, BlockMask& set) {
+void propagate(const SignLinks& links, BlockMask& set) {
     unsigned changed = 0;  // slices whose neighbours still need an update
     for (std::size_t x = 0; x < set.size(); ++x) {
         if (set[x] == 0) continue;

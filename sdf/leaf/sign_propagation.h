@@ -34,7 +34,7 @@ struct SignLinks {
 SignLinks findSignLinks(const float* distances);
 
 /// Adds to a set all voxels that links connect to it.
-void spread(const SignLinks& links, BlockMask& set);
+void propagate(const SignLinks& links, BlockMask& set);
 
 /// Sets of voxels on each side of the surface. A voxel in both sets is a contradiction.
 struct BlockSides {
@@ -50,8 +50,8 @@ inline constexpr float farFrom = 0.5f, midFrom = 0.1f;
 template <class IsInside>
 std::size_t completeSides(const SignLinks& links, std::initializer_list<const BlockMask*> seeds, BlockSides& sides,
                           IsInside isInside) {
-    spread(links, sides.outside);
-    spread(links, sides.inside);
+    propagate(links, sides.outside);
+    propagate(links, sides.inside);
     std::size_t onBoth = 0;
     for (std::size_t x = 0; x < sides.inside.size(); ++x)
         onBoth += std::size_t(std::popcount(sides.outside[x] & sides.inside[x]));
@@ -61,7 +61,7 @@ std::size_t completeSides(const SignLinks& links, std::initializer_list<const Bl
                 const int voxel = int(x) * 64 + std::countr_zero(open);
                 BlockMask& side = isInside(voxel) ? sides.inside : sides.outside;
                 side[x] |= std::uint64_t(1) << (voxel % 64);
-                spread(links, side);
+                propagate(links, side);
             }
     return onBoth;
 }

@@ -85,15 +85,15 @@ bool PartNesting::findInnermost(unsigned part, Containers& containers) const {
     };
     others_.forEachAround(parts_.box(part), [&](const RankedBox& item) {
         bool within = false;
-        const bool goOn = test(item, within);
+        const bool continues = test(item, within);
         if (within) containers.own.push_back(item.part);
-        return goOn;
+        return continues;
     });
     if (tests > maxTests) return false;
     separating_.forEachAround(parts_.box(part), [&](const RankedBox& item) {
         bool within = false;
-        const bool goOn = test(item, within);
-        if (!within) return goOn;
+        const bool continues = test(item, within);
+        if (!within) return continues;
         if (item.rank > rank_[part]) {
             containers.own.push_back(item.part);
             return true;

@@ -55,7 +55,7 @@ class PartNesting {
         unsigned innermost = noPart;
         std::vector<unsigned> added, removed, own;
     };
-    /// What a part passes on to those within it.
+    /// State that a part passes on to the parts it contains.
     struct Heritage {
         bool passesOn = false;
         std::vector<unsigned> touching;  // larger parts that touch it: others know them not from it

@@ -133,18 +133,18 @@ class ExitSearch {
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(tag)) {
             const auto corner = [&](int i) { return loadLanes(tag, leaf.corners[i], lane); };
             const PointLanes a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
-            const Vec ab2 = dot(ab, ab), ac2 = dot(ac, ac), room = hn::Set(tag, rounding);
+            const Vec ab2 = dot(ab, ab), ac2 = dot(ac, ac), margin = hn::Set(tag, rounding);
             const Vec facing = dot(cross(ab, ac), d);
-            const Vec facingRoom = hn::Mul(room, hn::Sqrt(hn::Mul(ab2, ac2)));
-            const Mask faces = hn::Gt(hn::Add(facing, facingRoom), hn::Zero(tag));
+            const Vec facingMargin = hn::Mul(margin, hn::Sqrt(hn::Mul(ab2, ac2)));
+            const Mask faces = hn::Gt(hn::Add(facing, facingMargin), hn::Zero(tag));
             if (hn::AllFalse(tag, faces)) continue;
             const PointLanes from = all(ray_.origin) - a, side = cross(d, from);
-            const Vec away = hn::Mul(room, hn::Sqrt(dot(from, from)));
-            const Vec uRoom = hn::Mul(away, hn::Sqrt(ac2)), vRoom = hn::Mul(away, hn::Sqrt(ab2));
-            const Vec u = hn::Add(dot(ac, side), uRoom), v = hn::Sub(vRoom, dot(ab, side));
+            const Vec away = hn::Mul(margin, hn::Sqrt(dot(from, from)));
+            const Vec uMargin = hn::Mul(away, hn::Sqrt(ac2)), vMargin = hn::Mul(away, hn::Sqrt(ab2));
+            const Vec u = hn::Add(dot(ac, side), uMargin), v = hn::Sub(vMargin, dot(ab, side));
             // both sides of this comparison have the margins of u and v
             const Vec largest =
-                hn::Add(hn::Add(facing, facingRoom), hn::Mul(hn::Set(tag, 2.0f), hn::Add(uRoom, vRoom)));
+                hn::Add(hn::Add(facing, facingMargin), hn::Mul(hn::Set(tag, 2.0f), hn::Add(uMargin, vMargin)));
             const Mask within = hn::And(hn::Ge(hn::Min(u, v), hn::Zero(tag)), hn::Le(hn::Add(u, v), largest));
             for (unsigned bits = bitsOf(hn::And(faces, within)); bits != 0; bits &= bits - 1)
                 nearest_ =

@@ -18,7 +18,7 @@ constexpr double cancelled = 1e-2;
 /// Minimum solid angle, of triangles with sides of about a voxel. Below it, the side on which a path passes an edge is
 /// uncertain.
 constexpr double tooClose = 1e-9;
-constexpr double wholeTurn = 2 * glm::pi<double>();
+constexpr double fullAngle = 2 * glm::pi<double>();
 
 glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
     const glm::dvec3 ab = b - a;
@@ -40,7 +40,7 @@ double angleAt(const TriangleCorners& c, const glm::dvec3& p) {
         const glm::dvec3 edge = c[(i + 1) % 3] - c[i];
         if (glm::length(glm::cross(edge, p - c[i])) <= samePlace * glm::length(edge)) return glm::pi<double>();
     }
-    return wholeTurn;
+    return fullAngle;
 }
 
 // A triangle thinner than samePlace has no reliable normal. The neighbour at its far side also meets the closest point

@@ -74,9 +74,9 @@ std::int32_t firstAbove(const glm::dvec3 (&p)[3], const glm::dvec2& at) {
 
 }  // namespace
 
-ColumnCrossings::ColumnCrossings(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, double voxelSize, bool fifths,
-                                 Progress* progress)
-    : mesh_(mesh), fifths_(fifths), voxelsPerUnit_(1 / voxelSize), progress_(progress) {
+ColumnCrossings::ColumnCrossings(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, double voxelSize,
+                                 bool everyFifthColumn, Progress* progress)
+    : mesh_(mesh), everyFifthColumn_(everyFifthColumn), voxelsPerUnit_(1 / voxelSize), progress_(progress) {
     gatherLeaves(leaves);
     gatherTriangles();
 }
@@ -125,7 +125,7 @@ void ColumnCrossings::addTriangle(std::uint32_t triangle, std::vector<TriangleIn
     const Interval x = range(0);
     if (x.empty()) return;
     const Interval y = range(1);
-    if (y.empty() || (fifths_ && !anyFifth(x, y))) return;
+    if (y.empty() || (everyFifthColumn_ && !anyFifth(x, y))) return;
     for (std::int64_t u = x.first >> 3; u <= x.last >> 3; ++u) {
         auto tile = std::lower_bound(tiles_.begin(), tiles_.end(), tileAt(u, y.first >> 3));
         for (const Tile last = tileAt(u, y.last >> 3); tile != tiles_.end() && *tile <= last; ++tile)
@@ -138,7 +138,7 @@ std::uint64_t ColumnCrossings::find(std::size_t tile, OfTile& crossings) const {
     const auto leaves = std::span(leaves_).subspan(leavesOfTile_[tile], leavesOfTile_[tile + 1] - leavesOfTile_[tile]);
     crossings.found.clear();
     const openvdb::Coord origin = leaves[0].leaf->origin();
-    const std::uint64_t asked = fifths_ ? fifthsOf(origin.x(), origin.y()) : ~std::uint64_t(0);
+    const std::uint64_t asked = everyFifthColumn_ ? fifthsOf(origin.x(), origin.y()) : ~std::uint64_t(0);
     for (std::size_t t = trianglesOfTile_[tile]; t < trianglesOfTile_[tile + 1]; ++t)
         addCrossings(triangles_[t], origin, asked, crossings.found);
     sortByLeaf(leaves, crossings);

@@ -42,9 +42,9 @@ class ColumnCrossings {
     };
 
     /// Keeps a reference to the mesh.
-    /// @param fifths    whether to find the crossings of one column in five only, spread evenly
-    /// @param progress  polled, unless null
-    ColumnCrossings(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, double voxelSize, bool fifths,
+    /// @param everyFifthColumn  whether to find the crossings of one column in five only, evenly distributed
+    /// @param progress          polled, unless null
+    ColumnCrossings(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, double voxelSize, bool everyFifthColumn,
                     Progress* progress);
 
     std::size_t tiles() const { return tiles_.size(); }
@@ -92,7 +92,7 @@ class ColumnCrossings {
     }
 
     const Mesh& mesh_;
-    const bool fifths_;
+    const bool everyFifthColumn_;
     const double voxelsPerUnit_;
     Progress* progress_;
     std::vector<LeafInTile> leaves_;            ///< by tile, then from bottom to top
@@ -120,7 +120,7 @@ class ColumnNumbers {
     std::int32_t below(std::size_t column) const { return winding_[column]; }
 
     /// Advances a column to the leaf's top, and calls visit(k, number) for each of its voxels. Call it once for each
-    /// column that is crossed; others may be climbed too.
+    /// column that is crossed; others may be advanced too.
     template <class Visit>
     void climb(std::size_t column, const Visit& visit) {
         std::int32_t& winding = winding_[column];

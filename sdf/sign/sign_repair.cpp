@@ -68,10 +68,11 @@ class TileRepair {
     ColumnNumbers numbers_;
 };
 
-/// @param fifths  whether to compare only one column in five
-SignRepair repairColumns(openvdb::FloatGrid& distance, const Mesh& mesh, float limit, bool fifths, Progress* progress) {
+/// @param everyFifthColumn  whether to compare only one column in five
+SignRepair repairColumns(openvdb::FloatGrid& distance, const Mesh& mesh, float limit, bool everyFifthColumn,
+                         Progress* progress) {
     const double voxelSize = distance.voxelSize()[0];
-    const ColumnCrossings columns(leavesOf(distance), mesh, voxelSize, fifths, progress);
+    const ColumnCrossings columns(leavesOf(distance), mesh, voxelSize, everyFifthColumn, progress);
     return tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, columns.tiles()), SignRepair(),
         [&](const auto& range, SignRepair sum) {
@@ -94,8 +95,8 @@ SignRepair repairColumns(openvdb::FloatGrid& distance, const Mesh& mesh, float l
 
 SignRepair repairSigns(openvdb::FloatGrid& distance, const Mesh& mesh, float limit, Progress* progress) {
     SignRepair some;
-    const bool fifths = distance.tree().leafCount() > fewLeaves;
-    if (fifths) {
+    const bool everyFifthColumn = distance.tree().leafCount() > fewLeaves;
+    if (everyFifthColumn) {
         some = repairColumns(distance, mesh, limit, true, progress);
         if (some.repaired + some.refused == 0) return some;
     }

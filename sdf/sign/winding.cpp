@@ -27,10 +27,10 @@ openvdb::CoordBBox spaceOf(const std::vector<BandLeaf*>& leaves, const WindingQu
     for (const BandLeaf* leaf : leaves) box.expand(leaf->getNodeBoundingBox());
     if (!query.slope) return box;
     const double reach = std::sqrt(query.winding.area() / (2 * glm::pi<double>())) / query.voxelSize;
-    const auto margin = std::int32_t(std::min(std::ceil(reach), farthestIndex));
+    const auto margin = std::int32_t(std::min(std::ceil(reach), maxIndexCoordinate));
     for (int axis = 0; axis < 3; ++axis) {
-        box.min()[axis] = std::int32_t(std::max(double(box.min()[axis]) - margin, -farthestIndex));
-        box.max()[axis] = std::int32_t(std::min(double(box.max()[axis]) + margin, farthestIndex));
+        box.min()[axis] = std::int32_t(std::max(double(box.min()[axis]) - margin, -maxIndexCoordinate));
+        box.max()[axis] = std::int32_t(std::min(double(box.max()[axis]) + margin, maxIndexCoordinate));
     }
     return box;
 }

@@ -22,7 +22,7 @@ struct TileTriangle {
 };
 static_assert(sizeof(TileTriangle) == 40, "files of triangles have no gaps");
 
-/// The whole mesh, as far as a tile must know it.
+/// Properties of the whole mesh that a tile needs.
 struct MeshFacts {
     Bounds box;
     glm::dvec3 origin{0};
@@ -31,7 +31,7 @@ struct MeshFacts {
 };
 
 struct BuiltTile {
-    /// Equal those of the whole field in the tile's box. Outside of it, all is space outside the surface. Blocks
+    /// Grids with the whole field's values in the tile's box; elsewhere with the exterior background. Blocks
     /// without a voxel in the band are leaves if the whole field needs them for its signs. Null if no leaf is in the
     /// box.
     std::shared_ptr<Grids> grids;

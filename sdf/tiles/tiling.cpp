@@ -27,7 +27,7 @@ float reachOf(const BuildOptions& options) {
 const Bounds& checked(const Bounds& mesh, const BuildOptions& options) {
     for (int axis = 0; axis < 3; ++axis)
         for (const float end : {mesh.lower[axis], mesh.upper[axis]})
-            if (!(std::abs(double(end) / double(options.voxelSize)) < farthestIndex))
+            if (!(std::abs(double(end) / double(options.voxelSize)) < maxIndexCoordinate))
                 throw std::invalid_argument(
                     fmt::format("voxelSize {:g} is too small for this mesh: index coordinates would leave 32 bits",
                                 options.voxelSize));

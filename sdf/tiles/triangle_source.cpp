@@ -92,8 +92,8 @@ class FileTriangles : public TriangleSource {
         const glm::vec3 farthest = glm::max(glm::abs(facts_.box.lower), glm::abs(facts_.box.upper));
         if (isTooFarForFloats(double(std::max({farthest.x, farthest.y, farthest.z})), double(facts_.box.longestSide())))
             fail(
-                "is so far from zero that floats round its coordinates: it is read whole or not at all; move it "
-                "closer");
+                "is so far from zero that floats round its coordinates, and cannot be built in tiles; move it closer, "
+                "or build it without tiles");
     }
 
     [[noreturn]] void fail(const std::string& why) const {

@@ -23,7 +23,7 @@ TEST_CASE("medians, geometric means and slopes") {
     CHECK(std::isnan(logSlope({1}, {1})));
 }
 
-TEST_CASE("a build in a child process tells what it took there") {
+TEST_CASE("a build in a child process reports what it took there") {
     const auto make = [] { return scene("ball", shapes::sphere(1, 4), 96); };
     const Footprint footprint = inChild(make, {Builder::reference, 3, 1}, 3, 10);
     CHECK(footprint.outcome.seconds > 0);

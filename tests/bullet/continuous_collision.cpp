@@ -88,8 +88,8 @@ TEST_CASE("No body passes through a thin plate or gains energy, at any speed and
                                           3 * any(random));
                 btRigidBody* body = world.add(one.moving, 1, {0.1f * any(random), 0.1f * any(random), 1.f}, turned);
                 // oblique by up to about 30 degrees, but still aimed at the plate
-                const float aslant = std::min(0.5f, 0.5f * half);
-                body->setLinearVelocity(speed * btVector3(aslant * any(random), aslant * any(random), -1));
+                const float sideways = std::min(0.5f, 0.5f * half);
+                body->setLinearVelocity(speed * btVector3(sideways * any(random), sideways * any(random), -1));
                 body->setAngularVelocity(0.3f * speed * btVector3(any(random), any(random), any(random)));
                 body->setActivationState(DISABLE_DEACTIVATION);
                 // Bullet's own gyroscopic integrator adds energy without bound to a body that rotates by radians in a

@@ -54,11 +54,11 @@ TEST_CASE("a body with small holes in its base gains no energy on any ground") {
             for (int i = 0; i < 4; ++i) {
                 const float turn = float(random(-3, 3));
                 const Drop result = drop(collider, *all[ground].shape, {turn, glm::vec2(random.point(0.3))}, 3);
-                CAPTURE(isOpen, all[ground].name, i, result.aside);
+                CAPTURE(isOpen, all[ground].name, i, result.sidewaysContacts);
                 CHECK(result.gain < maxEnergyGain);
                 CHECK_FALSE(result.fell);
                 CHECK(result.sleeps);
-                if (ground < smoothGrounds) CHECK(result.aside == 0);
+                if (ground < smoothGrounds) CHECK(result.sidewaysContacts == 0);
             }
     }
 }

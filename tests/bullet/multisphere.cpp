@@ -87,9 +87,9 @@ TEST_CASE("The surface of a multisphere is that of its balls at any margin and s
         const glm::vec3 above = bullet::detail::toGlm(centres[i]) + glm::vec3(0, 0, scale);
         CHECK(convex.nearest(above, scale).distance <= Approx(scale - radii[i]));
     }
-    const glm::vec3 beside = scale * glm::vec3(-1, -0.2f, 0);
-    CHECK(convex.nearest(beside, scale).distance == Approx(0.45f * scale));
-    CHECK(convex.nearest(beside, scale).normal.x == Approx(-1));
+    const glm::vec3 nextTo = scale * glm::vec3(-1, -0.2f, 0);
+    CHECK(convex.nearest(nextTo, scale).distance == Approx(0.45f * scale));
+    CHECK(convex.nearest(nextTo, scale).normal.x == Approx(-1));
 }
 
 TEST_CASE("Balls rest in a groove at the depth of its two faces") {

@@ -145,7 +145,7 @@ TEST_CASE("Rest stabilisation does not stop thrown, weightless, hanging or moved
     World world;
     const WorldExtensions still(world.dynamics, resting);
 
-    SECTION("at the top of its way a body turns back as ever") {
+    SECTION("at the top of its path a body reverses as usual") {
         btRigidBody* body = world.add(ball, 1, {0, 0, 0});
         body->setLinearVelocity({0, 0, 2});
         world.run(1);

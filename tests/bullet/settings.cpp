@@ -26,8 +26,8 @@ MeshReport ball(float radius) {
     return inspect(shapes::sphere(radius, 4));
 }
 
-bool warnsOf(const Settings& advice, const std::string& what) {
-    for (const std::string& warning : advice.warnings)
+bool warnsOf(const Settings& settings, const std::string& what) {
+    for (const std::string& warning : settings.warnings)
         if (warning.find(what) != std::string::npos) return true;
     return false;
 }
@@ -35,20 +35,20 @@ bool warnsOf(const Settings& advice, const std::string& what) {
 }  // namespace
 
 TEST_CASE("A plate gets three voxels of its thickness") {
-    const Settings advice = recommendSettings(plate(0.03f), {.speed = 1});
-    CHECK(advice.voxelSize == Approx(0.01));
-    CHECK(advice.wallVoxels == Approx(3));
-    CHECK(advice.margin == advice.voxelSize);
+    const Settings settings = recommendSettings(plate(0.03f), {.speed = 1});
+    CHECK(settings.voxelSize == Approx(0.01));
+    CHECK(settings.wallVoxels == Approx(3));
+    CHECK(settings.margin == settings.voxelSize);
     // one voxel of margin and a cell's diagonal
-    CHECK(advice.exteriorWidthVoxels == 3);
-    CHECK(advice.splitImpulse == -advice.voxelSize);
-    CHECK_FALSE(warnsOf(advice, "voxels thick"));
+    CHECK(settings.exteriorWidthVoxels == 3);
+    CHECK(settings.splitImpulse == -settings.voxelSize);
+    CHECK_FALSE(warnsOf(settings, "voxels thick"));
 }
 
 TEST_CASE("A plate too thin for any affordable field gets a warning") {
-    const Settings advice = recommendSettings(plate(1e-3f), {.speed = 1});
-    CHECK(advice.voxelSize == Approx(1.f / 512));
-    CHECK(warnsOf(advice, "voxels thick"));
+    const Settings settings = recommendSettings(plate(1e-3f), {.speed = 1});
+    CHECK(settings.voxelSize == Approx(1.f / 512));
+    CHECK(warnsOf(settings, "voxels thick"));
     // a user-defined voxel size is checked by the same rule
     CHECK(warnsOf(recommendSettings(plate(0.03f), {.voxelSize = 0.016f}), "voxels thick"));
     CHECK_FALSE(warnsOf(recommendSettings(plate(0.03f), {.voxelSize = 0.015f}), "voxels thick"));
@@ -61,17 +61,17 @@ TEST_CASE("A thin tip does not determine the voxel size, but gets a warning") {
     const MeshReport mesh = inspect(shapes::join({shapes::sphere(0.5f, 4), tip}));
     CHECK(mesh.thinnestWall == Approx(2e-4).margin(2e-7));  // coordinates near 0.6 are rounded by 6e-8
     CHECK(mesh.commonWall > 0.9f);
-    const Settings advice = recommendSettings(mesh, {});
-    CHECK(advice.voxelSize == Approx(mesh.bounds.longestSide() / 64));
-    CHECK(warnsOf(advice, "tip"));
-    CHECK_FALSE(warnsOf(advice, "voxels thick"));
+    const Settings settings = recommendSettings(mesh, {});
+    CHECK(settings.voxelSize == Approx(mesh.bounds.longestSide() / 64));
+    CHECK(warnsOf(settings, "thinnest part"));
+    CHECK_FALSE(warnsOf(settings, "voxels thick"));
 }
 
 TEST_CASE("A ball has no thin wall: its size decides") {
-    const Settings advice = recommendSettings(ball(0.5f), {});
-    CHECK(advice.voxelSize == Approx(1.f / 64));
-    CHECK(advice.substeps == 1);
-    CHECK(advice.substepsWithoutSpeculation == 1);
+    const Settings settings = recommendSettings(ball(0.5f), {});
+    CHECK(settings.voxelSize == Approx(1.f / 64));
+    CHECK(settings.substeps == 1);
+    CHECK(settings.substepsWithoutSpeculation == 1);
     // unless it collides with one, or must fit through a gap
     CHECK(recommendSettings(ball(0.5f), {.thickness = 0.03f}).voxelSize == Approx(0.01));
     // its own wall counts if it is thinner
@@ -88,13 +88,13 @@ TEST_CASE("Fast bodies get substeps or continuous collision recommended") {
     const Settings fast = recommendSettings(plate(0.03f), {.speed = 10});
     CHECK(fast.substepsWithoutSpeculation == 12);
     CHECK(fast.substeps == 1);
-    CHECK(warnsOf(fast, "swept contacts"));
+    CHECK(warnsOf(fast, "speculative contacts"));
     CHECK(warnsOf(fast, "WorldExtensions"));
     CHECK(fast.interiorWidthVoxels == 10);
     // below the margin nothing tunnels
     const Settings slow = recommendSettings(plate(0.03f), {.speed = 0.5f});
     CHECK(slow.substepsWithoutSpeculation == 1);
-    CHECK_FALSE(warnsOf(slow, "swept contacts"));
+    CHECK_FALSE(warnsOf(slow, "speculative contacts"));
     CHECK(slow.interiorWidthVoxels == 3);
     // rotation curves the paths of points: at most half a radian per step
     CHECK(recommendSettings(plate(0.03f), {.speed = 1, .spin = 100}).substeps == 4);
@@ -122,15 +122,15 @@ TEST_CASE("Settings outside the limits of Bullet and its solver get a warning") 
 
 TEST_CASE("Estimates are near the built field") {
     const Mesh mesh = GENERATE(shapes::sphere(0.5f, 5), shapes::torus(0.4f, 0.1f), shapes::box({0.5f, 0.5f, 0.05f}, 8));
-    const Settings advice = recommendSettings(inspect(mesh), {.speed = 1});
-    const LevelSet field = build(mesh, {.voxelSize = advice.voxelSize,
-                                        .exteriorWidthVoxels = float(advice.exteriorWidthVoxels),
-                                        .interiorWidthVoxels = float(advice.interiorWidthVoxels)});
-    CHECK(double(advice.voxels) == Approx(double(field.activeVoxels())).epsilon(0.2));
+    const Settings settings = recommendSettings(inspect(mesh), {.speed = 1});
+    const LevelSet field = build(mesh, {.voxelSize = settings.voxelSize,
+                                        .exteriorWidthVoxels = float(settings.exteriorWidthVoxels),
+                                        .interiorWidthVoxels = float(settings.interiorWidthVoxels)});
+    CHECK(double(settings.voxels) == Approx(double(field.activeVoxels())).epsilon(0.2));
     const double bytes = double(Field(field).memoryBytes());
-    CHECK(bytes < 1.3 * double(advice.fieldBytes));
-    CHECK(bytes > 0.5 * double(advice.fieldBytes));
-    CHECK(advice.buildSeconds > 0);
+    CHECK(bytes < 1.3 * double(settings.fieldBytes));
+    CHECK(bytes > 0.5 * double(settings.fieldBytes));
+    CHECK(settings.buildSeconds > 0);
 }
 
 TEST_CASE("Invalid scenes are rejected by name") {

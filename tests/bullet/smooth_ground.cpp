@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <bilayer/integration/bullet/extensions.h>
-#include "collider/contact/smooth_turn.h"
+#include "collider/contact/smooth_edge_angle.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/waves.h"
 #include "integration/bullet/detail/smooth_ground.h"
@@ -163,7 +163,7 @@ TEST_CASE("Ground that moves gives bodies nothing") {
 
 TEST_CASE("The turn at a point of a mesh is that of the edges of its triangle, if they are smooth") {
     const auto turnAt = [](const Mesh& mesh, const glm::vec3& point) {
-        return glm::degrees(detail::smoothTurnAt(detail::MeshTree(mesh, voxel), point));
+        return glm::degrees(detail::smoothEdgeAngleAt(detail::MeshTree(mesh, voxel), point));
     };
     CHECK(turnAt(shapes::cylinder(0.2f, 0.4f, 96), {0.2f, 0.01f, 0.05f}) == Approx(3.75f).epsilon(1e-3));
     CHECK(turnAt(shapes::cylinder(0.2f, 0.4f, 12), {0.2f, 0.01f, 0.05f}) == 0);
@@ -253,8 +253,8 @@ TEST_CASE("The maximum turn of smooth edges is that of two half planes, without 
         return std::vector<Triangle>{{{{0, 0, 0}, {0, 1, 0}, {-1, 0, 0}}}, {{{0, 0, 0}, {x, 0, z}, {0, 1, 0}}}};
     };
     for (const float degrees : {0.1f, 3.f, 12.f, 19.f})
-        CHECK(detail::maxSmoothTurn(roof(glm::radians(degrees))) == Approx(glm::radians(degrees)).epsilon(1e-3));
-    CHECK(detail::maxSmoothTurn(roof(0)) == 0);
-    CHECK(detail::maxSmoothTurn(roof(glm::radians(30.f))) == 0);
-    CHECK(detail::maxSmoothTurn({}) == 0);
+        CHECK(detail::maxSmoothEdgeAngle(roof(glm::radians(degrees))) == Approx(glm::radians(degrees)).epsilon(1e-3));
+    CHECK(detail::maxSmoothEdgeAngle(roof(0)) == 0);
+    CHECK(detail::maxSmoothEdgeAngle(roof(glm::radians(30.f))) == 0);
+    CHECK(detail::maxSmoothEdgeAngle({}) == 0);
 }

@@ -129,7 +129,7 @@ TEST_CASE("device samples in empty blocks grow with the distance") {
     checkEmptyBlocks(onDevice());
 }
 
-TEST_CASE("device samples of a band narrower than a cell tell the sides apart") {
+TEST_CASE("device samples of a band narrower than a cell have the right signs") {
     checkNarrowBand(onDevice());
 }
 

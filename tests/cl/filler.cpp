@@ -368,7 +368,7 @@ TEST_CASE("one device serves two builds at once") {
     checkSame(build(ring, optionsFor(ring, 60)), *ringField);
 }
 
-TEST_CASE("the filler tells its name and device") {
+TEST_CASE("the filler reports its name and device") {
     const Device device = openDevice();
     CHECK(openclFiller(device).backend() == "opencl");
     CHECK(openclFiller(device).device() == device.info().name);

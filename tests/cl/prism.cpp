@@ -292,7 +292,7 @@ TEST_CASE("too little device memory for prisms is an error that says how much is
                       Contains("prisms") && Contains("MiB") && Contains(device.info().name));
 }
 
-TEST_CASE("a build of prisms tells what it took on the device") {
+TEST_CASE("a build of prisms reports what it took on the device") {
     const Mesh mesh = shapes::sphere(1.f, 4);
     const std::uint64_t memory = 16;
     const OpenclFiller filler = openclFiller(openDevice(), {.memoryMiB = memory, .profile = true});

@@ -64,7 +64,7 @@ TEST_CASE("a kernel that does not compile is an error with the log") {
                                    Contains(device.info().name) && Contains("unheardOf"));
 }
 
-TEST_CASE("a failed call is told with its name, its code and the device") {
+TEST_CASE("a failed call is reported with its name, its code and the device") {
     const Device device = openDevice();
     const cl::Program program = buildProgram(device.impl(), source, options);
     try {

@@ -276,8 +276,8 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
     grids->points = openvdb::FloatGrid::create();
     requireRefusal(LevelSet(grids), "no surface points");
 
-    requireRefusal(changed({}, settingPoint("N", openvdb::Vec3s(0, 0, 2))), "no place with a normal");
-    requireRefusal(changed({}, settingPoint("P", openvdb::Vec3s(nan, 0, 0))), "no place with a normal");
+    requireRefusal(changed({}, settingPoint("N", openvdb::Vec3s(0, 0, 2))), "needs a finite position and a normal");
+    requireRefusal(changed({}, settingPoint("P", openvdb::Vec3s(nan, 0, 0))), "needs a finite position and a normal");
     requireRefusal(changed({}, settingPoint("id", std::int32_t(-1))), "number -1");
     requireRefusal(changed({}, settingPoint("id", std::int32_t(1 << 30))), "number");
     const std::int32_t taken =
@@ -331,7 +331,7 @@ TEST_CASE("a body with the mesh of another, or with one that is not valid, is re
     REQUIRE_THROWS_AS(withBody(stored(), body), std::invalid_argument);
 }
 
-TEST_CASE("a field that was moved away from its body is told") {
+TEST_CASE("a field that was moved away from its body is rejected") {
     requireRefusal(changed([](Distance& grid) { grid.transform().postTranslate(openvdb::Vec3d(0.1, 0, 0)); }),
                    "another field");
     requireRefusal(changed([](Distance& grid) { grid.transform().postScale(0.5); }), "another field");

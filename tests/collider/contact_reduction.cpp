@@ -44,13 +44,13 @@ std::vector<Contact> circle() {
 
 TEST_CASE("Contact reduction keeps the same contacts under rounding noise, and the deepest of contacts that separate") {
     std::mt19937 random(5);
-    std::uniform_real_distribution<float> tremble(-2e-5f, 2e-5f);
+    std::uniform_real_distribution<float> jitter(-2e-5f, 2e-5f);
     const std::vector<Contact> flat = circle();
     std::vector<ContactPatch> last;
     std::set<std::uint32_t> first;
     for (int step = 0; step < 50; ++step) {
         std::vector<Contact> contacts = flat;
-        for (Contact& contact : contacts) contact.distance += tremble(random);
+        for (Contact& contact : contacts) contact.distance += jitter(random);
         last = reduce(contacts, last).patches;
         if (step == 0) first = featuresOf(last);
         REQUIRE(first.size() < 12);
@@ -317,6 +317,6 @@ TEST_CASE("Contact reduction always keeps the deepest contact of bodies at rest,
         last = reduce(contacts, last).patches;
         for (const ContactPatch& patch : last)
             for (int i = 0; i < patch.count; ++i) kept = std::min(kept, patch.contacts[i].distance);
-        CHECK(kept - deepest <= 1.5f * pressTolerance);  // the extent is below 1.5 m
+        CHECK(kept - deepest <= 1.5f * normalMotionTolerance);  // the extent is below 1.5 m
     }
 }

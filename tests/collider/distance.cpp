@@ -194,7 +194,7 @@ TEST_CASE("A limit ends the search for bodies that are farther apart") {
     CHECK(distance(a, far).distance == Approx(3e9));
 }
 
-TEST_CASE("A body inside another is told from one that is apart") {
+TEST_CASE("A body inside another is distinguished from one that is apart") {
     const Collider ball = colliderOf(shapes::sphere(0.2f, 3)), large = colliderOf(shapes::sphere(1, 4)),
                    shell = colliderOf(shapes::join({shapes::sphere(1, 4), shapes::flipped(shapes::sphere(0.8f, 4))})),
                    pair = colliderOf(shapes::join({shapes::moved(shapes::sphere(0.1f, 3), {0, 0, 0.2f}),

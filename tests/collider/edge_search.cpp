@@ -18,14 +18,14 @@ using namespace bilayer::test;
 TEST_CASE("The minimum between two points is found at kinks and on parabolas") {
     const float lowest = GENERATE(0.13f, 0.5f, 0.91f);
     const auto kink = [&](float x) {
-        return x < lowest ? Slope{x, 0.7f * (lowest - x), -0.7f} : Slope{x, x - lowest, 1};
+        return x < lowest ? ValueAndSlope{x, 0.7f * (lowest - x), -0.7f} : ValueAndSlope{x, x - lowest, 1};
     };
-    const auto parabola = [&](float x) { return Slope{x, (x - lowest) * (x - lowest), 2 * (x - lowest)}; };
+    const auto parabola = [&](float x) { return ValueAndSlope{x, (x - lowest) * (x - lowest), 2 * (x - lowest)}; };
     int asked = 0;
     const auto search = [&](auto&& function) {
         asked = 0;
         const auto at = [&](float x) { return ++asked, std::optional(function(x)); };
-        return lowestBetween(function(0), function(1), 1e-4f, at);
+        return minimumBetween(function(0), function(1), 1e-4f, at);
     };
     const auto atKink = search(kink);
     REQUIRE(atKink);
@@ -35,7 +35,7 @@ TEST_CASE("The minimum between two points is found at kinks and on parabolas") {
     REQUIRE(onParabola);
     CHECK(onParabola->place == Approx(lowest).margin(6e-3));
     CHECK(asked <= 3);
-    CHECK_FALSE(lowestBetween(kink(0), kink(1), 1e-4f, [](float) { return std::optional<Slope>(); }));
+    CHECK_FALSE(minimumBetween(kink(0), kink(1), 1e-4f, [](float) { return std::optional<ValueAndSlope>(); }));
 }
 
 TEST_CASE("An edge below two faces has the depth of the minimum translation over the ridge between them") {

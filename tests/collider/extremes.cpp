@@ -261,7 +261,7 @@ TEST_CASE("the closest point of what is far away is on the near side, and bounds
     }
 }
 
-TEST_CASE("bodies anywhere, of any size, on any way, collide or do not") {
+TEST_CASE("bodies anywhere, of any size, along any path, collide or do not") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Extremes extreme(seed);
@@ -323,7 +323,7 @@ TEST_CASE("a rotation that is no unit quaternion is refused, also with a motion 
     CHECK_FALSE(contacts.empty());
 }
 
-TEST_CASE("distances and impacts of bodies anywhere, of any size, on any way, end") {
+TEST_CASE("distances and impacts of bodies anywhere, of any size, along any path, end") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Extremes extreme(seed);

@@ -81,7 +81,7 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
     for (const Solid& solid : smallSolids()) {
         const Field field(levelSetOf(solid, h, 3, 6));
         const Clearance clearance = field.data().coarse;
-        int beside = 0, ruledOut = 0;
+        int farPoints = 0, ruledOut = 0;
         for (int i = 0; i < 20000; ++i) {
             const glm::vec3 p = random.point(i % 4 ? 0.6 : 3);
             const auto radius = float(random(0, 0.3)), reach = float(random(-2, 2) * h);
@@ -94,11 +94,11 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
             if (clearance.isAbove(place, reach)) REQUIRE((!sample.inBand || sample.distance > reach - 1e-6f));
             // the diagonal of a coarse cell, plus the distance to the surface in another one
             if (truth < radius + 2 * 1.7321 * edge) continue;
-            ++beside;
+            ++farPoints;
             ruledOut += clearance.isOutside(place, radius / edge);
         }
-        REQUIRE(beside > 1000);
-        REQUIRE(ruledOut > 0.9 * beside);  // about 0.95; the sample is a few thousand random points
+        REQUIRE(farPoints > 1000);
+        REQUIRE(ruledOut > 0.9 * farPoints);  // about 0.95; the sample is a few thousand random points
     }
     const Field field(levelSetOf(sphereSolid(0.4), h));
     for (const glm::vec3& p : {glm::vec3(notANumber, 0, 0), glm::vec3(0, notANumber, 0)})
@@ -180,7 +180,7 @@ TEST_CASE("the bound grows with the number of empty blocks, outside and inside")
     checkEmptyBlocks(makeField);
 }
 
-TEST_CASE("a band narrower than a cell still tells the sides apart") {
+TEST_CASE("a band narrower than a cell still has the right signs") {
     checkNarrowBand(makeField);
 }
 

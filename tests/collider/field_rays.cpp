@@ -239,20 +239,22 @@ TEST_CASE("segments are rays that end, and many at once are the same as one by o
         field.segment(from, to, hits);
         int met = 0;
         for (std::size_t i = 0; i < from.size(); ++i) {
-            const glm::dvec3 way = glm::dvec3(to[i]) - glm::dvec3(from[i]);
+            const glm::dvec3 displacement = glm::dvec3(to[i]) - glm::dvec3(from[i]);
             const auto one = field.segment(from[i], to[i]);
-            const auto ray = field.raycast({from[i], glm::vec3(glm::normalize(way)), float(glm::length(way))});
+            const auto ray =
+                field.raycast({from[i], glm::vec3(glm::normalize(displacement)), float(glm::length(displacement))});
             REQUIRE(bool(one) == bool(ray));
             REQUIRE(bool(one) == bool(hits[i]));
             if (!one) continue;
             ++met;
             // the ray's direction is rounded to floats
             REQUIRE(std::abs(one->distance - ray->distance) < 1e-4f);
-            const glm::dvec3 beside = glm::cross(glm::dvec3(one->position) - glm::dvec3(from[i]), glm::normalize(way));
+            const glm::dvec3 offset =
+                glm::cross(glm::dvec3(one->position) - glm::dvec3(from[i]), glm::normalize(displacement));
             // triangles are hit by rays that pass within this tolerance; the rest is rounding of floats
-            REQUIRE(glm::length(beside) < 1e-5 * double(field.voxelSize()) + 6e-8);
+            REQUIRE(glm::length(offset) < 1e-5 * double(field.voxelSize()) + 6e-8);
             REQUIRE(one->position == hits[i]->position);
-            REQUIRE(double(one->distance) <= glm::length(way) * (1 + 1e-6));
+            REQUIRE(double(one->distance) <= glm::length(displacement) * (1 + 1e-6));
         }
         REQUIRE(met > 20);
         REQUIRE_THROWS_AS(field.segment(from, std::span(to).first(3), hits), std::invalid_argument);

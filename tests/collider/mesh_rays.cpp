@@ -153,7 +153,7 @@ TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing n
             corners[k] = {random(-1, 1), width * random(-1, 1), random(1, 2)};
             flat[k] = {corners[k].x, corners[k].y, 0};
         }
-        const double beside = std::sqrt(squaredDistance(glm::dvec3(0), flat[0], flat[1], flat[2]));
+        const double offset = std::sqrt(squaredDistance(glm::dvec3(0), flat[0], flat[1], flat[2]));
         // the rotated corners are rounded; a triangle seen edge-on shifts along itself
         const double twiceArea = std::abs(glm::cross(flat[1] - flat[0], flat[2] - flat[0]).z);
         const double rounding = 1e-14 / twiceArea;
@@ -164,10 +164,10 @@ TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing n
         double along = 10;
         glm::dvec3 position;
         const bool meets = TriangleRay(glm::dvec3(0), direction, tolerance).meets(corners, along, position);
-        CAPTURE(i, width, beside);
+        CAPTURE(i, width, offset);
         // the tolerance is perpendicular to the longest axis of the direction
-        if (beside < 0.5 * tolerance) REQUIRE(meets);
-        if (beside > 1.001 * tolerance) REQUIRE_FALSE(meets);
+        if (offset < 0.5 * tolerance) REQUIRE(meets);
+        if (offset > 1.001 * tolerance) REQUIRE_FALSE(meets);
         (meets ? met : passed) += 1;
         if (!meets) continue;
         REQUIRE(glm::length(glm::cross(position, direction)) < 1.001 * tolerance + rounding);
@@ -181,12 +181,12 @@ TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing n
 TEST_CASE("rays that start on a triangle meet it on the way in only") {
     const Mesh box = shapes::box(glm::vec3(0.5f), 2);
     const MeshTree tree(box, 0.02f);
-    for (const double beside : {0.0, 1e-12, -1e-12}) {
-        const glm::dvec3 from(0.5 + beside, 0.1, 0.2);
+    for (const double offset : {0.0, 1e-12, -1e-12}) {
+        const glm::dvec3 from(0.5 + offset, 0.1, 0.2);
         const auto in = firstHit(tree, {from, {-1, 0, 0}, infinity});
         REQUIRE(in);
         REQUIRE(in->along < 1e-9);
-        if (beside >= 0) REQUIRE(bool(firstHit(tree, {from, {1, 0, 0}, infinity})) == (beside == 0));
+        if (offset >= 0) REQUIRE(bool(firstHit(tree, {from, {1, 0, 0}, infinity})) == (offset == 0));
     }
 }
 

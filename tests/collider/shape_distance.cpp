@@ -195,7 +195,7 @@ TEST_CASE("The distance of a shape from a collider is that of brute force, with 
     CHECK(separatedCount > 100);
 }
 
-TEST_CASE("Shapes that overlap a collider are told from those inside of it and around it") {
+TEST_CASE("Shapes that overlap a collider are distinguished from those inside it and around it") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

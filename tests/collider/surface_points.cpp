@@ -171,26 +171,26 @@ TEST_CASE("an edge keeps its points before the faces next to it") {
     }
 }
 
-TEST_CASE("tips finer than the spacing have points that look every way") {
+TEST_CASE("convex vertices smaller than the spacing have points with normals in all directions") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     const float size = GENERATE(0.05f, 0.4f, 1.f, 1.5f);  // radius of a ball or a tube [spacings]
     CAPTURE(size);
     const SurfacePoints ball(shapes::sphere(size, 4), 1), ring(shapes::torus(4, size, 200, 48), 1);
-    const auto looks = [](const SurfacePoints& points, const glm::vec3& way, const glm::vec3& near, float within) {
+    const auto maxCosine = [](const SurfacePoints& points, const glm::vec3& direction, const glm::vec3& near,
+                              float within) {
         float best = -1;
         for (const SurfacePoint& p : points.points())
-            if (glm::distance(p.position, near) < within) best = std::max(best, glm::dot(p.normal, way));
+            if (glm::distance(p.position, near) < within) best = std::max(best, glm::dot(p.normal, direction));
         return best;
     };
     for (int i = 0; i < 300; ++i) {
-        const glm::vec3 way = random.direction();
-        REQUIRE(looks(ball, way, {}, 2 * size) > 0.65f);
+        REQUIRE(maxCosine(ball, random.direction(), {}, 2 * size) > 0.65f);
         const double around = random(0, 6.28), across = random(0, 6.28);  // around the ring, around the tube
         const glm::vec3 radial(std::cos(around), std::sin(around), 0);
         const glm::vec3 out = float(std::cos(across)) * radial + glm::vec3(0, 0, std::sin(across));
-        REQUIRE(looks(ring, out, 4.f * radial + size * out, 1) > 0.65f);
+        REQUIRE(maxCosine(ring, out, 4.f * radial + size * out, 1) > 0.65f);
     }
 }
 

@@ -14,7 +14,7 @@
 using namespace bilayer;
 
 TEST_CASE(
-    "the bowl demo writes its field and its recording, prints its table, and tells whether its criteria are met") {
+    "the bowl demo writes its field and its recording, prints its table, and reports whether its criteria are met") {
     const auto out = test::scratch("bowl"), log = test::scratch("bowl.txt");
     const auto play = [&](double seconds) {
         return WEXITSTATUS(std::system(fmt::format("{} --bodies 3 --seconds {} --resolution 32 --out '{}' > '{}'",

@@ -52,7 +52,7 @@ TEST_CASE("energy rises by the most that it climbs above what it once was") {
     CHECK(std::isnan(demo::Energies{{1, std::nan("")}, {0, 0}}.rise()));
 }
 
-TEST_CASE("a stage tells what a falling body does, and how deep bodies overlap") {
+TEST_CASE("a stage reports what a falling body does, and how deep bodies overlap") {
     const auto ball = demo::makeThing(shapes::sphere(0.1f, 4), {0.01f});
     const auto play = [&](float offset) {
         demo::Stage stage("fall", {.stepsPerSecond = 100, .stepsPerFrame = 10});

@@ -65,7 +65,7 @@ TEST_CASE("blocks stick and slide on an incline as friction says") {
     judge([&] { return demo::incline(options); });
 }
 
-TEST_CASE("blocks and nuts of which theory says nothing meet no criterion") {
+TEST_CASE("blocks and nuts for which theory makes no prediction meet no criterion") {
     demo::InclineOptions blocks;
     blocks.slopes = {20};
     blocks.frictions = {1};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cancelling: seeding, particles and obstacles ask their caller whether to go on.
+// Cancelling: seeding, particles and obstacles ask their caller whether to continue.
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <algorithm>

@@ -69,7 +69,7 @@ TEST_CASE("fill goes as far as it is asked to") {
     CHECK(fluid::extend(band, 3 * h).interiorWidth() == 3 * h);
 }
 
-TEST_CASE("fill refuses what cannot be swept") {
+TEST_CASE("extend() rejects fields without an inside and boxes that are too large") {
     // an open surface in which the flood finds no inside
     const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
     const LevelSet outside = build(sheet, {.voxelSize = 0.1f, .sign = Sign::flood});

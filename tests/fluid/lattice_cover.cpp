@@ -80,8 +80,8 @@ TEST_CASE("the widest place of a plate or a ball is as wide as it is") {
     for (const float width : {0.01f, 0.4f, 1.3f}) {
         CAPTURE(width);
         const Mesh plate = shapes::box({4, 3, width / 2}), ball = shapes::sphere(width / 2, 4);
-        CHECK(fluid::detail::LatticeCover(plate, nullptr).widestPlace().width == Approx(width).epsilon(0.01));
-        CHECK(fluid::detail::LatticeCover(ball, nullptr).widestPlace().width == Approx(width).epsilon(0.02));
+        CHECK(fluid::detail::LatticeCover(plate, nullptr).widestPlace().widthVoxels == Approx(width).epsilon(0.01));
+        CHECK(fluid::detail::LatticeCover(ball, nullptr).widestPlace().widthVoxels == Approx(width).epsilon(0.02));
     }
 }
 
@@ -90,7 +90,7 @@ TEST_CASE("a ball of the covering width holds a voxel wherever the lattice falls
         const Mesh ball = shapes::sphere(float(width / 2), 5);
         return fluid::detail::LatticeCover(ball, nullptr).isComplete();
     };
-    CHECK(covers(1.005 * fluid::detail::coveringWidth));
+    CHECK(covers(1.005 * fluid::detail::coveringWidthVoxels));
     CHECK_FALSE(covers(1.73));
 }
 

@@ -15,7 +15,7 @@ namespace {
 constexpr unsigned maxPoints = 16, maxTriangles = 40;  // of a mesh of arbitrary triangles
 constexpr int cellsAlong = 3;                          // of a solid of cells
 constexpr unsigned maxDamages = 6;
-constexpr int farthestMagnitude = 12;  // of a translation, as a power of two, relative to the size
+constexpr int maxMagnitude = 12;  // of a translation, as a power of two, relative to the size
 
 Mesh arbitraryTriangles(ByteSource& bytes) {
     Mesh mesh;
@@ -127,8 +127,7 @@ Mesh meshOf(ByteSource& bytes) {
     if (kind == 1) damageMesh(mesh, bytes);
     const float scale = std::exp2(float(int(bytes.below(21)) - 6));
     const bool isFar = bytes.byte() % 8 == 0;
-    const glm::vec3 shift =
-        isFar ? std::exp2(float(bytes.below(farthestMagnitude))) * bytes.latticePoint() : glm::vec3(0);
+    const glm::vec3 shift = isFar ? std::exp2(float(bytes.below(maxMagnitude))) * bytes.latticePoint() : glm::vec3(0);
     for (glm::vec3& point : mesh.points) point = scale * (point + shift);
     return mesh;
 }

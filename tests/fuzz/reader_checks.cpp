@@ -16,7 +16,7 @@
 namespace bilayer::test {
 namespace {
 
-constexpr std::size_t longestError = 1000;  // [bytes] without the path: readers quote at most some words of a file
+constexpr std::size_t maxErrorBytes = 1000;  // [bytes] without the path: readers quote at most some words of a file
 
 using Reader = Mesh (*)(const std::filesystem::path&, ReadReport&);
 
@@ -86,7 +86,7 @@ void checkReader(Bytes file, const char* name, Reader read) {
 
 void requirePlainError(const std::string& text) {
     require(!text.empty(), "an error has no text");
-    require(text.size() <= longestError, "an error is too long: " + text);
+    require(text.size() <= maxErrorBytes, "an error is too long: " + text);
     for (const char c : text)
         require(static_cast<unsigned char>(c) >= ' ' && c != '\x7f', "an error has control characters: " + text);
 }

@@ -146,7 +146,7 @@ TEST_CASE("bodies and contacts that are refused memory throw, and the next ones 
     });
 }
 
-TEST_CASE("a step in Bullet that is refused memory throws, and the world goes on") {
+TEST_CASE("a step in Bullet that is refused memory throws, and the world continues") {
     const auto box = exactBox({0.3f, 0.2f, 0.15f}, 0.05f), ground = exactBox({2, 2, 0.2f}, 0.1f);
     refuseEach("step", [&] {
         bullet::Shape boxShape(box), groundShape(ground);
@@ -158,7 +158,7 @@ TEST_CASE("a step in Bullet that is refused memory throws, and the world goes on
     });
 }
 
-TEST_CASE("a world goes on after a step that was refused memory") {
+TEST_CASE("a world continues after a step that was refused memory") {
     const auto box = exactBox({0.3f, 0.2f, 0.15f}, 0.05f), ground = exactBox({2, 2, 0.2f}, 0.1f);
     bullet::Shape boxShape(box), groundShape(ground);
     World world;

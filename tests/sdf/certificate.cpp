@@ -61,7 +61,7 @@ struct Brick {
         throw std::logic_error("no such block");
     }
 
-    // A voxel that has a nearest piece, or none; 0: there is no such voxel beside the first one.
+    // A voxel that has a nearest piece, or none; 0: there is no such voxel in addition to the first one.
     static int voxelWhere(const BlockDistances& block, bool known) {
         for (int voxel = 1; voxel < blockVoxels; ++voxel)
             if ((block.nearest[voxel] >= 0) == known) return voxel;

@@ -213,7 +213,7 @@ TEST_CASE("A mesh inside out is flipped at any position") {
     }
 }
 
-TEST_CASE("The double layer method tells where faces lie back to back") {
+TEST_CASE("The double layer method reports where faces lie back to back") {
     Mesh mesh = shapes::sphere(1, 3);
     const auto undecided = [&] {
         const LevelSet field = build(mesh, {.voxelSize = 0.1f, .method = Method::doubleLayer});

@@ -132,7 +132,7 @@ TEST_CASE("a small hole leaves the rest of a solid as it was") {
     CHECK(leaking.field->getConstAccessor().getValue({0, 0, 0}) > 0);
 }
 
-TEST_CASE("sheets without thickness have no inside") {
+TEST_CASE("open surfaces have no inside") {
     const auto nowhere = [](const glm::dvec3&) { return false; };
     const glm::mat4 skew = glm::rotate(glm::mat4(1), 0.7f, glm::vec3(1, 2, 3));
     const Mesh sheet = without(shapes::box({20, 20, 0.5f}, 1), [](const glm::vec3& p) { return p.z < 0.4f; });

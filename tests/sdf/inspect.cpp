@@ -92,7 +92,7 @@ TEST_CASE("holes, folds and flips are counted") {
     CHECK(inspect(mesh).degenerateTriangles == 1);
 }
 
-TEST_CASE("inside-out components are told from cavities") {
+TEST_CASE("inside-out components are distinguished from cavities") {
     const Mesh big = shapes::sphere(2, 3), small = shapes::sphere(1, 3), tiny = shapes::sphere(0.5f, 3);
     CHECK(inspect(shapes::flipped(big)).insideOutComponents == 1);
     CHECK(inspect(shapes::join({big, shapes::flipped(small)})).insideOutComponents == 0);

@@ -106,7 +106,7 @@ TEST_CASE("open surfaces are oriented by what they would bound") {
     CHECK(orient(sheet).flippedTriangles == 1);
 }
 
-TEST_CASE("a surface with one side is left alone and told of") {
+TEST_CASE("a one-sided surface is unchanged and reported") {
     Mesh strip;
     const unsigned segments = 30;
     for (unsigned i = 0; i < segments; ++i) {

@@ -52,9 +52,9 @@ TEST_CASE("glTF: strips and fans are triangles") {
     CHECK(corners({0, 1, 2, 3, 4}, 6) == Corners{1, 2, 0, 2, 3, 0, 3, 4, 0});
     CHECK(corners({0, 1}, 5).empty());
     CHECK(corners({0, 1, 2, 3, 4}, 4) == Corners{0, 1, 2});
-    CHECK(tells(readGltf(gltf), "2 indices"));
+    CHECK(mentions(readGltf(gltf), "2 indices"));
     for (const int mode : {0, 1, 2, 3}) CHECK(corners({0, 1, 2}, mode).empty());
-    CHECK(tells(readGltf(gltf), "1 primitives of points or lines"));
+    CHECK(mentions(readGltf(gltf), "1 primitives of points or lines"));
 }
 
 TEST_CASE("glTF: nodes place meshes in double precision, and mirrors keep the outward side") {
@@ -144,7 +144,7 @@ TEST_CASE("glTF: the default scene is read") {
     CHECK(upper(readGltf(gltf)).x == 1);
     gltf.add("scenes", {{"nodes", {1}}});
     CHECK(upper(readGltf(gltf)).x == 1);
-    CHECK(tells(readGltf(gltf), "scene 0 of 2"));
+    CHECK(mentions(readGltf(gltf), "scene 0 of 2"));
     gltf.file["scene"] = 1;
     CHECK(lower(readGltf(gltf)).x == 9);
     gltf.file["scene"] = 2;
@@ -153,7 +153,7 @@ TEST_CASE("glTF: the default scene is read") {
     gltf.file.erase("scenes");
     CHECK(volume(readGltf(gltf)) == 16);
     gltf.add("meshes", gltf.file["meshes"][0]);
-    CHECK(tells(readGltf(gltf), "1 meshes were left out"));
+    CHECK(mentions(readGltf(gltf), "1 meshes were left out"));
 }
 
 TEST_CASE("glTF: parts outside the scene are reported") {
@@ -162,18 +162,18 @@ TEST_CASE("glTF: parts outside the scene are reported") {
     gltf.add("nodes", {{"children", {1}}});
     const Polygons shared = readGltf(gltf);
     CHECK(volume(shared) == 8);
-    CHECK(tells(shared, "1 nodes with a mesh are outside of the scene"));
+    CHECK(mentions(shared, "1 nodes with a mesh are outside of the scene"));
     gltf.file["scenes"][0]["nodes"] = {0, 2};
     CHECK(readGltf(gltf).notes.empty());
     gltf.file["scenes"][0]["nodes"] = json::array();
-    CHECK(tells(readGltf(gltf), "the scene shows 0 meshes; the file has 1 meshes and 3 nodes"));
-    CHECK(tells(readGltf(gltf), "2 nodes with a mesh are outside of the scene"));
+    CHECK(mentions(readGltf(gltf), "the scene shows 0 meshes; the file has 1 meshes and 3 nodes"));
+    CHECK(mentions(readGltf(gltf), "2 nodes with a mesh are outside of the scene"));
     Gltf empty;
     empty.view({0}, Gltf::Byte);
-    CHECK(tells(readGltf(empty), "the file has 0 meshes and 0 nodes"));
+    CHECK(mentions(readGltf(empty), "the file has 0 meshes and 0 nodes"));
     Gltf points = Gltf::cube();
     primitive(points)["mode"] = 0;
-    CHECK(tells(readGltf(points), "1 primitives of points or lines"));
+    CHECK(mentions(readGltf(points), "1 primitives of points or lines"));
 }
 
 TEST_CASE("glTF: trees of nodes may be deep, and must be trees") {
@@ -217,7 +217,7 @@ TEST_CASE("glTF: skins are applied, and morph targets are reported") {
     const Polygons skinned = readGltf(gltf);
     CHECK(lower(skinned) == glm::dvec3(-1, -1, -1));
     CHECK(upper(skinned) == glm::dvec3(1, 1, 5));
-    CHECK(tells(skinned, "skins"));
+    CHECK(mentions(skinned, "skins"));
     gltf.file["skins"][0]["joints"] = {1};
     refuses(gltf, {"joint 1", "has 1"});
     gltf.file["nodes"][0]["skin"] = 3;
@@ -225,7 +225,7 @@ TEST_CASE("glTF: skins are applied, and morph targets are reported") {
     Gltf morphed = Gltf::cube();
     primitive(morphed)["targets"] = {{{"POSITION", 0}}};
     CHECK(volume(readGltf(morphed)) == 8);
-    CHECK(tells(readGltf(morphed), "morph"));
+    CHECK(mentions(readGltf(morphed), "morph"));
 }
 
 TEST_CASE("glTF: images are never loaded") {

@@ -93,7 +93,7 @@ TEST_CASE("skeletons make no surface") {
                              "1\n0 0 0\n"});
     const Polygons skeleton = readScene(path);
     CHECK(skeleton.corners.empty());
-    CHECK(test::tells(skeleton, "the scene shows 0 meshes"));
+    CHECK(test::mentions(skeleton, "the scene shows 0 meshes"));
     CHECK_THROWS_WITH(readMesh(path), Catch::Contains("holds no triangle"));
 }
 
@@ -103,7 +103,7 @@ TEST_CASE("what no reader knows is refused by its ending") {
     CHECK_THROWS_WITH(readScene("/nonexistent.dae"), Catch::Contains("/nonexistent.dae: no such file"));
 }
 
-TEST_CASE("an importer that takes too long, too much, or crashes is an error that tells what to do") {
+TEST_CASE("an importer that takes too long, too much, or crashes is an error that states what to do") {
     using namespace std::chrono_literals;
     test::Gltf gltf = test::Gltf::cube();
     const auto path = gltf.write("slow.gltf");

@@ -99,7 +99,7 @@ TEST_CASE("balanced() takes zeros of both signs for one") {
     CHECK(balanced(mesh));
 }
 
-TEST_CASE("what a surface bounds is told by area") {
+TEST_CASE("what a surface bounds is decided by area") {
     CHECK(bounding(shapes::sphere(1, 3)).solid == 1);
     const Bounding both = bounding(shapes::join({shapes::box({2, 2, 2}, 4), shapes::box({1, 1, 1}, 4)}));
     CHECK(both.solid == Approx(0.8).margin(0.02));
@@ -121,7 +121,7 @@ TEST_CASE("what a surface bounds is told by area") {
     }
 }
 
-TEST_CASE("few lines tell what a closed surface bounds as well as many") {
+TEST_CASE("few lines decide what a closed surface bounds as well as many") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     std::mt19937 random(seed);

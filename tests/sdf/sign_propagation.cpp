@@ -84,7 +84,7 @@ TEST_CASE("links: neighbours are linked if their distances together exceed a vox
     }
 }
 
-TEST_CASE("links: a side spreads to the whole group, and one voxel is asked for each group without one") {
+TEST_CASE("links: a sign propagates to the whole group, and one voxel is queried for each group without one") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

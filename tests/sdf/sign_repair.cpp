@@ -324,7 +324,7 @@ TEST_CASE("double sheets stay as they are and hold nothing") {
     CHECK_FALSE(hasFacesBackToBack(shapes::join({box, box})));
 }
 
-TEST_CASE("a report that has been made tells whether normals will do") {
+TEST_CASE("an existing report states whether normals suffice") {
     const unsigned start = test::seed();
     CAPTURE(start);
     Random random(start);

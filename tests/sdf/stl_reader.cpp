@@ -9,7 +9,7 @@
 using namespace bilayer;
 using namespace bilayer::test;
 
-TEST_CASE("STL: size and contents tell text from binary") {
+TEST_CASE("STL: size and contents distinguish text from binary") {
     for (const char* header : {"", "solid", "solid box", "SOLID facet normal", "COLOR=abcd", "facet"})
         for (const std::string tail : {"", "\n", "abc"}) {
             CAPTURE(header, tail);

@@ -67,7 +67,7 @@ TEST_CASE("the triangles of a file are those of the mesh that is read whole") {
     }
 }
 
-TEST_CASE("files that must be read whole are told apart") {
+TEST_CASE("files that must be read whole are recognised") {
     const std::filesystem::path obj = test::scratch("whole.obj"), far = test::scratch("far.ply"),
                                 text = test::scratch("text.stl");
     writeMesh(obj, shapes::sphere(1, 2));

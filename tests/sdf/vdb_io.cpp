@@ -105,7 +105,7 @@ TEST_CASE("a plain OpenVDB program reads the file") {
     CHECK(file.readGrid("distance")->getGridClass() == openvdb::GRID_LEVEL_SET);
 }
 
-TEST_CASE("a field tells who signed it") {
+TEST_CASE("a field states how its signs were found") {
     const Mesh mesh = shapes::torus(1, 0.3f, 60, 30);
     BuildOptions options{.voxelSize = 0.05f};
     options.method = Method::doubleLayer;

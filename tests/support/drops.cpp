@@ -99,7 +99,8 @@ int contactsAside(btDispatcher& dispatcher, const btRigidBody& body) {
 // The body's transform where the mesh is turned and placed as asked, its lowest point at the drop height.
 btTransform start(const Collider& collider, const Pose& frame, const DropPlace& place) {
     const btTransform inMesh(bullet::detail::toBullet(frame.rotation), bullet::detail::toBullet(frame.position));
-    const btTransform mesh(btQuaternion(btVector3(0, 0, 1), place.turn), btVector3(place.centre.x, place.centre.y, 0));
+    const btTransform mesh(btQuaternion(btVector3(0, 0, 1), place.rotation),
+                           btVector3(place.centre.x, place.centre.y, 0));
     btTransform body = mesh * inMesh.inverse();
     body.getOrigin().setZ(body.getOrigin().z() + height + dropHeight - lowest(collider.mesh(), mesh));
     return body;
@@ -134,7 +135,7 @@ Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& gro
         }
         smallest = std::min(smallest, now);
         gain = std::max(gain, now - smallest);
-        result.aside += contactsAside(world.dispatcher, body);
+        result.sidewaysContacts += contactsAside(world.dispatcher, body);
     }
     result.gain = gain / (gravity * double(dropHeight));  // of 1 kg
     result.sleeps = !body.isActive();

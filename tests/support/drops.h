@@ -27,7 +27,7 @@ std::vector<Ground> grounds();
 
 /// Where a body falls.
 struct DropPlace {
-    float turn;        ///< initial rotation about z [rad]
+    float rotation;    ///< initial rotation about z [rad]
     glm::vec2 centre;  ///< of the mesh's own origin [m]
 };
 
@@ -36,9 +36,9 @@ struct Drop {
     /// Maximum increase of the energy over its earlier minimum, relative to the energy of the fall. Infinite if the
     /// motion is not finite.
     double gain = 0;
-    int aside = 0;        ///< contacts in all steps whose normals point sideways or down
-    bool sleeps = false;  ///< at the end
-    bool fell = false;    ///< the centre of mass ends below the ground: the body went through it, or over its side
+    int sidewaysContacts = 0;  ///< contacts in all steps whose normals point sideways or down
+    bool sleeps = false;       ///< at the end
+    bool fell = false;         ///< the centre of mass ends below the ground: the body went through it, or over its side
 };
 
 /// Drops a body of 1 kg, in steps of 1/240 s. Throws std::invalid_argument for a body without volume.

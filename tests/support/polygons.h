@@ -40,7 +40,7 @@ inline glm::dvec3 upper(const detail::Polygons& p) {
     return high;
 }
 
-inline bool tells(const detail::Polygons& p, const std::string& text) {
+inline bool mentions(const detail::Polygons& p, const std::string& text) {
     return std::any_of(p.notes.begin(), p.notes.end(),
                        [&](const std::string& note) { return note.find(text) != std::string::npos; });
 }

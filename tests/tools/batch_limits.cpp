@@ -97,7 +97,7 @@ TEST_CASE("a crash ends one mesh alone") {
     CHECK(leftovers(output).empty());
 }
 
-TEST_CASE("an interrupted batch leaves no half file, and goes on where it was") {
+TEST_CASE("an interrupted batch leaves no half file, and continues where it was") {
     const int signal = GENERATE(SIGINT, SIGTERM, SIGKILL);
     CAPTURE(signal);
     const fs::path library = boxLibrary("interrupted", 40), output = emptyFolder("interrupted_fields"),

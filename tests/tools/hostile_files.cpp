@@ -14,8 +14,8 @@ using namespace bilayer::test;
 
 namespace {
 
-constexpr std::size_t checksumSize = 23;    // of the line at the end, which files of other programs lack [bytes]
-constexpr std::size_t longestError = 1000;  // [bytes]
+constexpr std::size_t checksumSize = 23;     // of the line at the end, which files of other programs lack [bytes]
+constexpr std::size_t maxErrorBytes = 1000;  // [bytes]
 
 // A text as OpenVDB stores it.
 std::string stored(const std::string& text) {
@@ -58,7 +58,7 @@ TEST_CASE("names in a file make no long error and steer no terminal") {
             const Result r = run({command, path});
             CHECK(r.status == 1);
             CHECK(r.errorLines() == 1);
-            CHECK(r.err.size() < longestError);
+            CHECK(r.err.size() < maxErrorBytes);
             CHECK_FALSE(steersTerminal(r.err));
         }
     }

@@ -131,7 +131,7 @@ TEST_CASE("a mesh that is not read whole gives the same leaves") {
     }
 }
 
-TEST_CASE("a build that was killed goes on with the missing tiles") {
+TEST_CASE("a build that was killed continues with the missing tiles") {
     const fs::path mesh = largeMeshFile("killed.ply"), folder = scratch("killed");
     const Words words = tiledBuild(mesh, folder, "4x4x2", {"--resolution", "300", "--threads", "1"});
     const pid_t process = start(words);

@@ -33,8 +33,8 @@ struct ConversionTask {
 /// Returns the fields of the mesh's record: "outcome" and what is known of the mesh. Outcomes are:
 /// - "done": the work folder holds the field;
 /// - "skipped": the output is up to date;
-/// - "large": the mesh must be built alone; "estimatedBytes" tells how much memory it needs;
-/// - "failed": "error" tells why.
+/// - "large": the mesh must be built alone; "estimatedBytes" states how much memory it needs;
+/// - "failed": "error" states why.
 /// The work folder holds a thumbnail if the mesh was read. Throws std::bad_alloc.
 Json convert(const ConversionOptions& options, const ConversionTask& task);
 

@@ -15,7 +15,7 @@ namespace bilayer::tools {
 /// A file of records, which no other process writes to.
 class RecordFile {
   public:
-    /// Creates the file on the first record. Its name tells the shard, the machine, the process and the time.
+    /// Creates the file on the first record. Its name contains the shard, the machine, the process and the time.
     RecordFile(std::filesystem::path folder, const Shard& shard);
     ~RecordFile();
     RecordFile(const RecordFile&) = delete;

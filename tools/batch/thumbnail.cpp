@@ -13,7 +13,7 @@ namespace {
 constexpr float margin = 3;                 // empty border [pixels]
 constexpr std::uint8_t background = 255;    // white, as the page
 constexpr float darkest = 30, range = 200;  // grey of a triangle seen from its edge, and what a facing one has more
-constexpr float depthShare = 0.35f;         // share of the brightness that tells the depth
+constexpr float depthShare = 0.35f;         // share of the brightness that shows the depth
 
 // Axes of the picture: to the right, upwards, and towards the viewer.
 const glm::vec3 toViewer = glm::normalize(glm::vec3(1, -1.4f, 0.9f));

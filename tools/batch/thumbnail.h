@@ -11,7 +11,7 @@ namespace bilayer::tools {
 /// Width and height of a thumbnail [pixels].
 inline constexpr int thumbnailSize = 96;
 
-/// Draws a mesh from above a corner of its box, in parallel projection, z upwards. Brightness tells how a triangle
+/// Draws a mesh from above a corner of its box, in parallel projection, z upwards. Brightness shows how a triangle
 /// faces the viewer, and how near it is. The mesh must be valid.
 GreyImage thumbnailOf(const Mesh& mesh);
 

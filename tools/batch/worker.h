@@ -44,13 +44,13 @@ class Worker {
     /// A file descriptor that is readable when read() has something to do.
     int pipe() const { return pipe_; }
 
-    /// Takes in what has arrived of the answer. Returns false if the child has ended.
+    /// Reads the part of the answer that has arrived. Returns false if the child has ended.
     bool read();
 
     /// Milliseconds to the time limit, at least 0; -1 without a limit.
     int millisecondsLeft() const;
 
-    /// Waits for the child's end, and tells how it ended. A child that has not ended is ended: its time is up.
+    /// Waits for the child's end, and returns how it ended. A child that is still running is ended: its time is up.
     WorkerEnd finish();
 
   private:

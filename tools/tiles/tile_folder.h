@@ -51,7 +51,8 @@ Json readJson(const std::filesystem::path& path);
 /// file.
 std::string fileHash(const std::filesystem::path& path);
 
-/// Returns whether the file of a tile is there with the bytes that its record tells. A tile without leaves has no file.
+/// Returns whether the file of a tile is there with the bytes that its record states. A tile without leaves has no
+/// file.
 bool isIntact(const TileFolder& folder, const Json& record);
 
 }  // namespace bilayer::tools

@@ -127,7 +127,7 @@ void joinSides(std::vector<Json>& records, const glm::ivec3& counts) {
             if (p[axis] < 0 || p[axis] >= counts[axis]) return nullptr;
         return &records[std::size_t((p.x * counts.y + p.y) * counts.z + p.z)];
     };
-    // the side that a neighbour gives; empty if it does not know either
+    // the side that a neighbour gives; empty if its side is unknown too
     const auto sideFrom = [&](const glm::ivec3& place, int face) -> std::string {
         glm::ivec3 next = place;
         next[face % 3] += face < 3 ? -1 : 1;

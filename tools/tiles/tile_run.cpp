@@ -72,7 +72,7 @@ class TileRun {
     }
 
   private:
-    // Plans the field, or goes on with what is planned. Afterwards there is the manifest of a finished field, or a plan
+    // Plans the field, or resumes the existing plan. Afterwards there is the manifest of a finished field, or a plan
     // and the records of exactly those tiles that are intact.
     void prepare() {
         const Json identity = identityOf(a_, counts_, fileHash(a_.mesh));

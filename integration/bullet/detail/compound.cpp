@@ -103,7 +103,7 @@ class ChildPairSearch {
     }
 
   private:
-    /// A shape on the way down the compounds.
+    /// A shape that the descent into compounds visits.
     struct Node {
         Side side;
         bool holdsField;

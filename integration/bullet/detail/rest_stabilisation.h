@@ -32,8 +32,8 @@ class RestStabilisation {
         Velocities last{};  ///< of the body, in the last step
         Velocities calm{};  ///< for a held body: before it was pushed
         int pushes = 0;     ///< steps since the push began
-        /// Speed of the farthest point at that time; for a held body, when it was first held [fractions of the speed
-        /// that gravity adds in a step].
+        /// Speed of the farthest point at the end of the last step; for a held body, when it was first held [fractions
+        /// of the speed that gravity adds in a step].
         float speed = 0;
         bool isHeld = false;
         bool sleeps = false;  ///< or was woken after Bullet applied gravity to the bodies

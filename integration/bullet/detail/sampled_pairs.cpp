@@ -41,8 +41,8 @@ bool SampledPairs::sample() {
         sampler_.data().sample(bodies_, queries_, found_);
         return true;
     } catch (const std::exception& error) {
-        warn(fmt::format("{} has failed to sample contacts, which the processor finds from now on: {}",
-                         sampler_.device(), error.what())
+        warn(fmt::format("{} failed to sample contacts, and the processor finds them instead: {}", sampler_.device(),
+                         error.what())
                  .c_str());
         sampler_ = {};
         return false;

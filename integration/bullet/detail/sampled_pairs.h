@@ -33,8 +33,8 @@ class SampledPairs {
     /// @return its number; the colliders must outlive the call of sample()
     std::optional<std::size_t> add(const Placed& a, const Placed& b, float margin);
 
-    /// Samples all pairs of the batch. If the sampler fails, that is reported once on the standard error output, and
-    /// the sampler is not used again.
+    /// Samples all pairs of the batch. If the sampler fails, that is reported once by warn(), and the sampler is not
+    /// used again.
     /// @return whether it succeeded
     bool sample();
 

@@ -12,7 +12,7 @@
 #include <bilayer/integration/bullet/shape.h>
 
 #include "collider/contact/collider_data.h"
-#include "collider/contact/smooth_turn.h"
+#include "collider/contact/smooth_edge_angle.h"
 #include "integration/bullet/detail/body_sweep.h"
 #include "integration/bullet/detail/compound.h"
 #include "integration/bullet/detail/contact_shapes.h"
@@ -26,7 +26,7 @@ namespace bilayer::bullet::detail {
 namespace {
 
 // Impacts up to this multiple of the energy that edges of the ground and of the body can take from it are given back. A
-// block touches several edges at once and rocks; its later impacts take what the earlier ones have put into that.
+// block touches several edges at once and rocks; its later impacts remove the rotation that earlier ones caused.
 constexpr float maxEnergyRatio = 4;
 // A body that is slower along the ground than this may be at rest [speeds that gravity adds in a step].
 constexpr float restSpeed = 2;
@@ -50,9 +50,9 @@ bool isGround(const btCollisionObject& object) {
     return velocity.linear.isZero() && velocity.angular.isZero();
 }
 
-/// The maximum turn of the smooth edges in the bounding box of a body [rad].
+/// The maximum angle between faces at the smooth edges in the bounding box of a body [rad].
 /// @param at  pose of the shape with the edges
-float turnUnder(const btRigidBody& body, const btCollisionShape& shape, const btTransform& at) {
+float edgeAngleUnder(const btRigidBody& body, const btCollisionShape& shape, const btTransform& at) {
     btVector3 lower, upper;
     body.getCollisionShape()->getAabb(at.inverse() * body.getWorldTransform(), lower, upper);
     std::vector<Triangle> triangles;
@@ -61,41 +61,42 @@ float turnUnder(const btRigidBody& body, const btCollisionShape& shape, const bt
         if (TestTriangleAgainstAabb2(corners, lower, upper)) triangles.push_back(triangle);
     };
     sheetOf(static_cast<const btConcaveShape&>(shape)).visit({toGlm(lower), toGlm(upper)}, add);
-    return maxSmoothTurn(triangles);
+    return maxSmoothEdgeAngle(triangles);
 }
 
 /// The same of an object of triangles.
-float turnUnder(const btRigidBody& body, const btCollisionObject& ground) {
-    float turn = 0;
-    visitLeafShapes(
-        *ground.getCollisionShape(), ground.getWorldTransform(),
-        [&](const btCollisionShape& leaf, const btTransform& at) { turn = std::max(turn, turnUnder(body, leaf, at)); });
-    return turn;
+float edgeAngleUnder(const btRigidBody& body, const btCollisionObject& ground) {
+    float angle = 0;
+    visitLeafShapes(*ground.getCollisionShape(), ground.getWorldTransform(),
+                    [&](const btCollisionShape& leaf, const btTransform& at) {
+                        angle = std::max(angle, edgeAngleUnder(body, leaf, at));
+                    });
+    return angle;
 }
 
-/// The turn of a field's surface at a place, in the axes of its shape [rad].
-float turnOf(const Shape& field, const btVector3& place) {
+/// The maximum angle at the smooth edges of a field's triangle at a place, in the axes of its shape [rad].
+float edgeAngleOf(const Shape& field, const btVector3& place) {
     const ColliderData& data = field.collider().data();
     const Placed placed = field.placed(btTransform::getIdentity());
     const glm::vec3 inField = glm::conjugate(placed.pose.rotation) * (toGlm(place) - placed.pose.position);
-    return data.body.mesh ? smoothTurnAt(data.meshTree(), inField / placed.scale) : 0;
+    return data.body.mesh ? smoothEdgeAngleAt(data.meshTree(), inField / placed.scale) : 0;
 }
 
-/// The turn of a body's own surface at a place, in the body's axes [rad].
-float turnOf(const btRigidBody& body, const btVector3& place) {
-    float turn = 0;
+/// The same of a body's own surface at a place, in the body's axes [rad].
+float edgeAngleOf(const btRigidBody& body, const btVector3& place) {
+    float angle = 0;
     visitLeafShapes(*body.getCollisionShape(), btTransform::getIdentity(),
                     [&](const btCollisionShape& leaf, const btTransform& at) {
                         if (isField(leaf))
-                            turn = std::max(turn, turnOf(static_cast<const Shape&>(leaf), at.inverse() * place));
+                            angle = std::max(angle, edgeAngleOf(static_cast<const Shape&>(leaf), at.inverse() * place));
                     });
-    return turn;
+    return angle;
 }
 
 }  // namespace
 
-float FacetImpact::loss(float turn) const {
-    const float caused = speed * std::tan(turn) * std::sqrt(maxEnergyRatio * mobility), ratio = caused / before;
+float FacetImpact::loss(float angle) const {
+    const float caused = speed * std::tan(angle) * std::sqrt(maxEnergyRatio * mobility), ratio = caused / before;
     return -0.5f * impulse * (before + after) * std::min(ratio * ratio, 1.f);
 }
 
@@ -112,10 +113,10 @@ const Velocity* SmoothGround::velocityBefore(const btCollisionObject& object) co
     return isKnown ? &before_[index].velocity : nullptr;
 }
 
-float SmoothGround::turnUnder(const Ground& ground) {
-    const auto [turn, isNew] = turns_.try_emplace(ground, 0.f);
-    if (isNew) turn->second = detail::turnUnder(*ground.first, *ground.second);
-    return turn->second;
+float SmoothGround::edgeAngleUnder(const Ground& ground) {
+    const auto [angle, isNew] = edgeAngles_.try_emplace(ground, 0.f);
+    if (isNew) angle->second = detail::edgeAngleUnder(*ground.first, *ground.second);
+    return angle->second;
 }
 
 float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& ground, float seconds) {
@@ -137,13 +138,13 @@ float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& g
                                  along.length(), body.computeImpulseDenominator(place, normal) / body.getInvMass()};
         if (impact.speed < restSpeed * seconds * body.getGravity().length()) continue;
         if (!(std::abs(impact.before) > minSlope * impact.speed)) continue;
-        const float own = turnOf(body, bodyIsFirst ? point.m_localPointA : point.m_localPointB);
-        loss += impact.loss(turnUnder(ground) + (own > 0 ? own + rotation : 0));
+        const float own = edgeAngleOf(body, bodyIsFirst ? point.m_localPointA : point.m_localPointB);
+        loss += impact.loss(edgeAngleUnder(ground) + (own > 0 ? own + rotation : 0));
     }
     return loss;
 }
 
-/// The energy returns to the linear velocity: a block that turns about the vertical is not turned faster.
+/// The energy returns to the linear velocity. Rotation about the vertical gets none of it.
 void SmoothGround::afterStep(float seconds) {
     std::unordered_map<btRigidBody*, float> losses;
     for (int m = 0; m < world_.getDispatcher()->getNumManifolds(); ++m) {
@@ -161,7 +162,7 @@ void SmoothGround::afterStep(float seconds) {
         body->setLinearVelocity(std::sqrt(1 + change) * body->getLinearVelocity());
     }
     before_.clear();
-    turns_.clear();
+    edgeAngles_.clear();
 }
 
 }  // namespace bilayer::bullet::detail

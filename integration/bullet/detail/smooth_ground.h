@@ -22,9 +22,9 @@ struct FacetImpact {
     float speed;     ///< of the body's centre along the triangle, before the step [m/s]
     float mobility;  ///< the contact point's inverse effective mass times the body's mass; 1 in line with the centre
 
-    /// The energy that the impact takes, up to what edges with this turn in all can cause [J]. Negative: it adds
+    /// The energy that the impact takes, up to what edges whose angles sum to this can cause [J]. Negative: it adds
     /// energy.
-    float loss(float turn) const;
+    float loss(float angle) const;
 };
 
 /// Gives bodies back what shallow edges of the ground and their own take: ExtensionOptions::smoothGround.
@@ -43,12 +43,12 @@ class SmoothGround {
         Velocity velocity;
     };
     const Velocity* velocityBefore(const btCollisionObject& object) const;
-    float turnUnder(const Ground& ground);
+    float edgeAngleUnder(const Ground& ground);
     float lossIn(const btPersistentManifold& manifold, const Ground& ground, float seconds);
 
     btDynamicsWorld& world_;
-    std::vector<State> before_;      ///< of the world's objects, in its order; only active bodies have a velocity
-    std::map<Ground, float> turns_;  ///< those asked for in this step [rad]
+    std::vector<State> before_;           ///< of the world's objects, in its order; only active bodies have a velocity
+    std::map<Ground, float> edgeAngles_;  ///< those asked for in this step [rad]
 };
 
 }  // namespace bilayer::bullet::detail

@@ -225,7 +225,7 @@ WidePlace LatticeCover::widestPlace() const {
         poll(progress_);
         found[i] = climb(mesh_, depth, mesh_.triangles[i * stride]);
     });
-    const auto byWidth = [](const WidePlace& a, const WidePlace& b) { return a.width < b.width; };
+    const auto byWidth = [](const WidePlace& a, const WidePlace& b) { return a.widthVoxels < b.widthVoxels; };
     return found.empty() ? WidePlace{} : *std::max_element(found.begin(), found.end(), byWidth);
 }
 

@@ -14,13 +14,13 @@ namespace bilayer::fluid::detail {
 
 /// A wide place of a body: a ball inside, into which no triangle reaches.
 struct WidePlace {
-    double width = 0;      ///< diameter of the ball [voxels]; 0: nothing is inside
-    glm::dvec3 centre{0};  ///< [voxels]
+    double widthVoxels = 0;  ///< diameter of the ball; 0: nothing is inside
+    glm::dvec3 centre{0};    ///< [voxels]
 };
 
 /// A ball of this width holds a voxel's centre wherever the lattice falls, and so does every body that contains it
 /// [voxels].
-inline constexpr double coveringWidth = 2.17;
+inline constexpr double coveringWidthVoxels = 2.17;
 
 /// Asks which lattices of voxels have a voxel inside of a body. Points are inside if their winding number is above one
 /// half. The answers depend on the body, its rotation and its size in voxels, not on its position. The mesh must be
@@ -33,8 +33,8 @@ class LatticeCover {
     LatticeCover(const Mesh& mesh, bilayer::detail::Progress* progress) : mesh_(mesh), progress_(progress) {}
 
     /// Whether the body holds a voxel's centre wherever the lattice falls. Tries 64 lattices, a quarter of a voxel
-    /// apart along each axis. In each one, a voxel must be as deep inside as any lattice is away from the next of the
-    /// 64, 0.22 voxels. A plate along the lattice is thus wide enough from 1.44 voxels on.
+    /// apart along each axis. Any other lattice is at most 0.22 voxels away from one of these. So in each of the 64, a
+    /// voxel must be that deep inside. A plate along the lattice is thus wide enough from 1.44 voxels on.
     bool isComplete() const;
 
     /// The widest place that climbs from some triangles reach.

@@ -20,7 +20,7 @@ void checkPlacement(const Placement& placement) {
         throw std::invalid_argument("the pose's rotation is not of unit length");
     if (!bilayer::detail::isFinite(placement.scale)) throw std::invalid_argument("the scale is not finite");
     if (!(std::min({placement.scale.x, placement.scale.y, placement.scale.z}) > 0))
-        throw std::invalid_argument("the scale is not positive: a mirror would turn the body inside out");
+        throw std::invalid_argument("the scale is not positive: mirrored, the body would be inside out");
 }
 
 }  // namespace bilayer::fluid::detail

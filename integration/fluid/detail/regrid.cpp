@@ -39,11 +39,11 @@ using Leaf = FloatTree::LeafNodeType;
 
 constexpr const char* byFlood = "flood";  // LevelSet::sign() of a mesh whose winding numbers are of no use
 
-constexpr float minFieldWidth = 1;   // [field voxels] on either side; a narrower band does not define the surface
-constexpr float rounding = 1e-5f;    // tolerance of a width that is a whole number of voxels
-constexpr double sameVoxels = 1e-6;  // relative tolerance of equal voxel sizes
-constexpr double maxHoleWidth = 2;   // [voxels]; wider holes are not closed
-constexpr double spareWidth = 1e-3;  // relative: what other voxels may change in a width by rounding
+constexpr float minFieldWidthVoxels = 1;  // [field voxels] on either side; a narrower band does not define the surface
+constexpr float rounding = 1e-5f;         // tolerance of a width that is a whole number of voxels
+constexpr double sameVoxels = 1e-6;       // relative tolerance of equal voxel sizes
+constexpr double maxHoleWidthVoxels = 2;  // [voxels]; wider holes are not closed
+constexpr double spareWidth = 1e-3;       // relative: what other voxels may change in a width by rounding
 
 // A mesh in voxels near the origin, where floats are most precise, and its translation by whole leaves.
 struct Placed {
@@ -112,7 +112,7 @@ bool fits(const LevelSet& field, const Placement& placement, const Transform& vo
 void requireCubes(const Transform& voxels) {
     if (!voxels.isLinear() || !voxels.hasUniformScale()) throw std::invalid_argument("the voxels are not cubes");
     if (!(voxels.baseMap()->determinant() > 0))
-        throw std::invalid_argument("the voxels are mirrored: that would turn the body inside out");
+        throw std::invalid_argument("the voxels are mirrored: the body would be inside out");
 }
 
 std::string text(const openvdb::Vec3d& v) {
@@ -147,14 +147,14 @@ void requireSolid(const Placed& body, const Transform& voxels, Progress& progres
     const SignChoice choice = chooseSignOfSolid(body.mesh, &progress);
     if (choice.sign == Sign::flood) refuseWithoutInside(choice.reason);
     if (choice.sign != Sign::winding) return;
-    const Hole hole = widestHole(choice.repaired ? *choice.repaired : body.mesh, maxHoleWidth, &progress);
+    const Hole hole = widestHole(choice.repaired ? *choice.repaired : body.mesh, maxHoleWidthVoxels, &progress);
     if (hole.width == 0) return;
     const double voxel = voxels.voxelSize()[0];
     throw std::invalid_argument(fmt::format(
         "the mesh is open: its widest hole, around {}, is {:.3g} wide; {:g} voxels of {:g} are closed: close it in the "
         "mesh, or take voxels of {:.3g} or more",
-        text(inWorld(hole.centre, body, voxels)), hole.width * voxel, maxHoleWidth, voxel,
-        roundedUp((1 + spareWidth) * hole.width * voxel / maxHoleWidth)));
+        text(inWorld(hole.centre, body, voxels)), hole.width * voxel, maxHoleWidthVoxels, voxel,
+        roundedUp((1 + spareWidth) * hole.width * voxel / maxHoleWidthVoxels)));
 }
 
 bool reachesDepth(const FloatGrid& grid, float depth) {
@@ -166,17 +166,18 @@ bool reachesDepth(const FloatGrid& grid, float depth) {
 // Refuses a body that is so thin everywhere that it may lie between voxels. Depends on the body alone, not on the
 // positions of the voxels: where one of them is that deep, the cover is complete.
 void requireWide(const LevelSet& field, const Placed& body, const Transform& voxels, Progress& progress) {
-    if (reachesDepth(*field.grids().distance, float(coveringWidth / 2))) return;
+    if (reachesDepth(*field.grids().distance, float(coveringWidthVoxels / 2))) return;
     const Mesh outward = outwardMesh(field, body.mesh);
     const LatticeCover cover(outward, &progress);
     if (cover.isComplete()) return;
     const WidePlace widest = cover.widestPlace();
-    if (!(widest.width > 0)) refuseWithoutInside("no ball fits into it");
-    const double voxel = voxels.voxelSize()[0], size = widest.width * voxel;
+    if (!(widest.widthVoxels > 0)) refuseWithoutInside("no ball fits into it");
+    const double voxel = voxels.voxelSize()[0], size = widest.widthVoxels * voxel;
     throw std::invalid_argument(fmt::format(
         "the body is too thin for these voxels and may lie between them: its widest place, around {}, is {:.3g} wide, "
         "and voxels are {:.3g}: make it thicker, or take voxels of {:.3g} or less",
-        text(inWorld(widest.centre, body, voxels)), size, voxel, roundedDown((1 - spareWidth) * size / coveringWidth)));
+        text(inWorld(widest.centre, body, voxels)), size, voxel,
+        roundedDown((1 - spareWidth) * size / coveringWidthVoxels)));
 }
 
 }  // namespace
@@ -214,7 +215,8 @@ FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const T
                       const std::function<bool(float)>& progress) {
     checkPlacement(placement);
     requireCubes(voxels);
-    if (std::min(field.exteriorWidth(), field.interiorWidth()) < minFieldWidth * field.voxelSize() * (1 - rounding))
+    if (std::min(field.exteriorWidth(), field.interiorWidth()) <
+        minFieldWidthVoxels * field.voxelSize() * (1 - rounding))
         throw std::invalid_argument("the field's band is narrower than a voxel");
     if (fits(field, placement, voxels, width)) {
         const auto grid = moved(*field.grids().distance, Coord(0), 1, width);

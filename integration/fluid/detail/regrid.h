@@ -16,7 +16,7 @@ namespace bilayer::fluid::detail {
 /// Max index coordinate of a body's box: keeps OpenVDB's 32-bit coordinates, and sums of two of them, in range.
 inline constexpr double maxIndex = 1 << 29;
 /// Min half width of a fluid's band, as openvdb::tools::checkLevelSet() requires [voxels].
-inline constexpr float minHalfWidth = 3;
+inline constexpr float minHalfWidthVoxels = 3;
 
 /// The signed distances of a placed mesh, in voxels of another grid. They are exact, as build() computes them, for any
 /// scaling and rotation of the body. Signs are found as by Sign::automatic.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "collider/contact/smooth_turn.h"
+#include "collider/contact/smooth_edge_angle.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,16 +9,16 @@
 namespace bilayer::detail {
 namespace {
 
-/// An edge is smooth if the surface turns by less than 20 degrees there (cosine).
+/// An edge is smooth if the normals of its faces differ by less than 20 degrees (cosine).
 constexpr float smoothCosine = 0.94f;
-/// Less is the rounding of normals [rad].
-constexpr double minTurn = 1e-3;
+/// Smaller angles are rounding of normals [rad].
+constexpr double minAngle = 1e-3;
 /// Predicted contacts stay this close to their surface [voxels].
 constexpr float nearby = 2;
 
 }  // namespace
 
-float maxSmoothTurn(std::span<const Triangle> triangles) {
+float maxSmoothEdgeAngle(std::span<const Triangle> triangles) {
     const Adjacency adjacency(triangles);
     float maxSine = 0;
     for (std::uint32_t t = 0; t < triangles.size(); ++t)
@@ -30,8 +30,8 @@ float maxSmoothTurn(std::span<const Triangle> triangles) {
     return std::asin(std::min(maxSine, 1.f));
 }
 
-// The normal of an edge is the mean of two unit normals: half the turn away from each.
-float smoothTurnAt(const MeshTree& tree, const glm::vec3& point) {
+// The normal of an edge is the mean of two unit normals: half the angle away from each.
+float smoothEdgeAngleAt(const MeshTree& tree, const glm::vec3& point) {
     const std::uint32_t part = tree.nearestPart(glm::dvec3(point), nearby);
     if (part == MeshTree::noPart) return 0;
     const std::uint32_t triangle = tree.featureOfPart(part, glm::dvec3(point)).triangle;
@@ -39,13 +39,13 @@ float smoothTurnAt(const MeshTree& tree, const glm::vec3& point) {
     const glm::uvec3 corners = mesh.triangles[triangle];
     const glm::dvec3 p[] = {mesh.points[corners.x], mesh.points[corners.y], mesh.points[corners.z]};
     const glm::dvec3 face = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
-    double maxTurn = 0;
+    double maxAngle = 0;
     for (int i = 0; i < 3; ++i) {
         const glm::dvec3 edge = tree.featureOf(triangle, 0.5 * (p[i] + p[(i + 1) % 3])).normal;
-        const double turn = 2 * std::atan2(glm::length(glm::cross(face, edge)), glm::dot(face, edge));
-        if (turn > minTurn && std::cos(turn) > double(smoothCosine)) maxTurn = std::max(maxTurn, turn);
+        const double angle = 2 * std::atan2(glm::length(glm::cross(face, edge)), glm::dot(face, edge));
+        if (angle > minAngle && std::cos(angle) > double(smoothCosine)) maxAngle = std::max(maxAngle, angle);
     }
-    return float(maxTurn);
+    return float(maxAngle);
 }
 
 }  // namespace bilayer::detail

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a surface of triangles turns at its smooth edges, which have a turn below 20 degrees.
+// The angles between the faces of a surface of triangles at its smooth edges, where they are below 20 degrees.
 // Tested by tests/bullet/smooth_ground.cpp.
 #pragma once
 
@@ -11,10 +11,10 @@
 
 namespace bilayer::detail {
 
-/// The maximum turn at the smooth edges of triangles; 0 if there are none [rad].
-float maxSmoothTurn(std::span<const Triangle> triangles);
+/// The maximum angle between the normals of two faces at the smooth edges of triangles; 0 if there are none [rad].
+float maxSmoothEdgeAngle(std::span<const Triangle> triangles);
 
 /// The same of the edges of the triangle that is nearest to a point of its mesh [m]. 0 if none is within two voxels.
-float smoothTurnAt(const MeshTree& mesh, const glm::vec3& point);
+float smoothEdgeAngleAt(const MeshTree& mesh, const glm::vec3& point);
 
 }  // namespace bilayer::detail
