@@ -75,13 +75,14 @@ inline constexpr std::uint32_t featureOfB = 0x80000000u;
 /// Options of collide().
 struct ContactOptions {
     /// Contacts are reported up to this separation [m], and as speculative contacts beyond it where a point's motion
-    /// hits the other surface. The exterior band must be sqrt(3) voxels wider than the margin to find all contacts
-    /// within it; speculative contacts from farther away need no band. The interior band must be sqrt(3) voxels wider
-    /// than the deepest penetration (see Sample::inBand).
+    /// hits the other surface. An exterior band that is sqrt(3) voxels wider than the margin makes the search fast:
+    /// points beyond the band run a closest-point search each (see Field::closest()), which takes the triangles if the
+    /// body has them. The interior band must be sqrt(3) voxels wider than the deepest penetration (see
+    /// Sample::inBand).
     float margin = 0;
     /// Takes distances from the triangles where the bodies have them (Collider::exactField()). Points outside both the
-    /// other body and its band then run a closest-point search each. Points too deep inside are still only counted in
-    /// the report.
+    /// other body and its band run a closest-point search each. Points too deep inside are still only counted in the
+    /// report.
     bool exact = false;
     /// Minimum cosine between a point's own normal and the reversed surface normal; contacts below it are dropped. It
     /// is the ghost-collision (internal-edge) filter. Points just below an edge of the other body get the normal of the

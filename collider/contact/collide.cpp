@@ -10,6 +10,7 @@
 #include "collider/contact/closest_points.h"
 #include "collider/contact/collider_data.h"
 #include "collider/contact/contact_cache.h"
+#include "collider/contact/contact_range.h"
 #include "collider/contact/finite_contacts.h"
 #include "collider/contact/normal_filter.h"
 #include "collider/contact/placed_shapes.h"
@@ -33,39 +34,55 @@ glm::vec3 outwardNormal(const Placed& other, const SurfaceSample& sample, const 
 // normals of facets.
 constexpr float beyondEdge = 1.5f, sharpCosine = 0.9f;
 
-// The outward normal of the surface near a place in the world; zero where the field has none.
-// @param byTriangles  if the field has them
-glm::vec3 normalNear(const Placed& body, const glm::vec3& place, bool byTriangles) {
-    const glm::vec3 at = body.pose.toBody(place) / body.scale;
-    const ContactField surface(body.collider, false);
-    const Field& field = surface.field();
-    const Sample sample = field.sample(at);
-    if (!sample.inBand) return glm::vec3(0);
-    const bool isExact = byTriangles && field.mesh();
-    const SurfaceSample there = isExact ? surfaceSampleAt(field, at, sample, true) : surface.inBand(at, sample);
-    return body.pose.rotation * there.normal;
-}
+// The outward normals of a body's surface near places in the world; zero where they are unknown.
+class NormalsNear {
+  public:
+    // @param maxDistance  from the surface beyond the band [m]; 0: none
+    NormalsNear(const Placed& body, float maxDistance)
+        : body_(body), surface_(body.collider, false, maxDistance > 0), maxDistance_(maxDistance / body.scale) {}
 
-// The same, by the triangles next to an edge.
-// @param outward  the direction in which the edge is
-glm::vec3 normalNearEdge(const Placed& body, const glm::vec3& place, const glm::vec3& outward) {
-    const float reach = beyondEdge * body.scale * body.collider.field().voxelSize();
-    const glm::vec3 here = normalNear(body, place, true);
-    const bool isEdge = glm::dot(here, normalNear(body, place + reach * outward, true)) < sharpCosine;
-    return isEdge ? here : normalNear(body, place, false);
-}
+    // @param byTriangles  if the field has them
+    glm::vec3 at(const glm::vec3& place, bool byTriangles) const {
+        const glm::vec3 point = body_.pose.toBody(place) / body_.scale;
+        const Field& field = surface_.field();
+        const Sample sample = field.sample(point);
+        const bool isExact = byTriangles && field.mesh() && sample.inBand;
+        const auto there =
+            isExact ? surfaceSampleAt(field, point, sample, true) : surface_.at(point, sample, maxDistance_);
+        return there ? body_.pose.rotation * there->normal : glm::vec3(0);
+    }
+
+    // The same, by the triangles next to an edge.
+    // @param outward  the direction in which the edge is
+    glm::vec3 nearEdge(const glm::vec3& place, const glm::vec3& outward) const {
+        const float reach = beyondEdge * body_.scale * surface_.voxelSize();
+        const glm::vec3 here = at(place, true);
+        const bool isEdge = glm::dot(here, at(place + reach * outward, true)) < sharpCosine;
+        return isEdge ? here : at(place, false);
+    }
+
+  private:
+    const Placed& body_;
+    ContactField surface_;
+    float maxDistance_;  // in the body's units
+};
 
 // Adds the contacts of A's points in the field of B, then of B's points in the field of A, as the visits find them.
 template <class VisitA, class VisitB>
-ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions& options,
+ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions& options, ContactRange range,
                           std::vector<Contact>& contacts, VisitA&& visitA, VisitB&& visitB) {
     ContactReport report;
+    const auto normalsNear = [&](const Placed& other) {
+        const float voxel = other.scale * other.collider.field().voxelSize();
+        return NormalsNear(
+            other, reachesBeyondBand(other, options.margin, range) ? options.margin + 2 * beyondEdge * voxel : 0);
+    };
     const auto passes = [&](const glm::vec3& normal, const Placed& body, const Placed& other, const SurfacePoint& point,
                             const SurfaceSample& sample) {
         const glm::vec3 own = body.pose.rotation * point.normal;
         const auto facesEdge = [&] {
             const auto normalAt = [&](const glm::vec3& place) {
-                return normalNearEdge(other, place, glm::normalize(normal - glm::dot(normal, own) * own));
+                return normalsNear(other).nearEdge(place, glm::normalize(normal - glm::dot(normal, own) * own));
             };
             return facesEdgeObliquely(body.pose.toWorld(body.scale * point.position), own,
                                       sample.distance * other.scale, normal, normalAt);
@@ -89,9 +106,9 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
         };
     };
     const std::size_t first = contacts.size();
-    visitA(PointsInField(a, b, options), report, addOf(a, b, false));
+    visitA(PointsInField(a, b, options, range), report, addOf(a, b, false));
     const std::size_t second = contacts.size();
-    visitB(PointsInField(b, a, options), report, addOf(b, a, true));
+    visitB(PointsInField(b, a, options, range), report, addOf(b, a, true));
     // edges are found next to their points; sorting moves them after all points
     const auto byFeature = [](const Contact& one, const Contact& other) { return one.feature < other.feature; };
     std::stable_sort(contacts.begin() + std::ptrdiff_t(first), contacts.begin() + std::ptrdiff_t(second), byFeature);
@@ -102,7 +119,7 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
 }  // namespace
 
 std::optional<PointQuery> pointQuery(const Placed& body, const Placed& other, float margin) {
-    return PointsInField(body, other, {.margin = margin}).query();
+    return PointsInField(body, other, {.margin = margin}, ContactRange::band).query();
 }
 
 SampledBody sampledBody(const Collider& collider) {
@@ -127,8 +144,25 @@ ContactReport collideFound(const Placed& a, const Placed& b, const ContactOption
         };
     };
     const std::size_t first = contacts.size();
-    const ContactReport report = addContacts(a, b, options, contacts, visit(ofA), visit(ofB));
+    const ContactReport report = addContacts(a, b, options, ContactRange::band, contacts, visit(ofA), visit(ofB));
     removeInfinite(contacts, first);
+    return report;
+}
+
+ContactReport collideWithin(ContactRange range, const Placed& a, const Placed& b, const ContactOptions& options,
+                            std::vector<Contact>& contacts, ContactCache* cache) {
+    for (const Placed* body : {&a, &b}) requireUnitRotation(body->pose);
+    const auto visit = [](CandidateLists::List* list) {
+        return
+            [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };
+    };
+    const std::size_t first = contacts.size();
+    CandidateLists* lists = cache ? &cache->data().candidates : nullptr;
+    const ContactReport report = addContacts(a, b, options, range, contacts, visit(lists ? &lists->ofA : nullptr),
+                                             visit(lists ? &lists->ofB : nullptr));
+    if (options.exact) refineClosest(std::span(contacts).subspan(first), a, b);
+    removeInfinite(contacts, first);
+    if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);
     return report;
 }
 
@@ -150,19 +184,7 @@ const std::string& PointSampler::device() const {
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
                       ContactCache* cache) {
-    for (const Placed* body : {&a, &b}) requireUnitRotation(body->pose);
-    const auto visit = [](CandidateLists::List* list) {
-        return
-            [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };
-    };
-    const std::size_t first = contacts.size();
-    CandidateLists* lists = cache ? &cache->data().candidates : nullptr;
-    const ContactReport report = addContacts(a, b, options, contacts, visit(lists ? &lists->ofA : nullptr),
-                                             visit(lists ? &lists->ofB : nullptr));
-    if (options.exact) refineClosest(std::span(contacts).subspan(first), a, b);
-    removeInfinite(contacts, first);
-    if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);
-    return report;
+    return collideWithin(ContactRange::margin, a, b, options, contacts, cache);
 }
 
 }  // namespace bilayer

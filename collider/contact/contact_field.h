@@ -15,8 +15,13 @@ namespace bilayer::detail {
 
 class ContactField {
   public:
-    ContactField(const Collider& collider, bool exact)
-        : collider_(collider), field_(exact ? collider.exactField() : collider.field()), exact_(exact) {}
+    /// @param exact       as ContactOptions::exact
+    /// @param beyondBand  whether to search for the surface from points beyond the band, too
+    ContactField(const Collider& collider, bool exact, bool beyondBand)
+        : collider_(collider),
+          field_(exact ? collider.exactField() : collider.field()),
+          exact_(exact),
+          beyondBand_(beyondBand) {}
 
     const Field& field() const { return field_; }
     float voxelSize() const { return field_.voxelSize(); }
@@ -26,12 +31,11 @@ class ContactField {
         return surfaceSampleAt(field_, point, sample, collider_.data().isExactAt(point, exact_));
     }
 
-    /// The same at any point. Outside the band the surface is known up to `maxDistance`, if exact distances are
-    /// requested.
+    /// The same at any point. Outside the band the surface is known up to `maxDistance`, if it is searched for there.
     std::optional<SurfaceSample> at(const glm::vec3& point, const Sample& sample, float maxDistance) const {
         if (sample.inBand) return inBand(point, sample);
-        if (!exact_ || sample.distance < 0) return std::nullopt;
-        const ClosestPoint closest = field_.closest(point, maxDistance);
+        if (!beyondBand_ || sample.distance < 0) return std::nullopt;
+        const ClosestPoint closest = collider_.exactField().closest(point, maxDistance);
         if (!closest.found) return std::nullopt;
         return SurfaceSample{closest.distance, directionOf(closest, point, field_.voxelSize())};
     }
@@ -54,7 +58,7 @@ class ContactField {
   private:
     const Collider& collider_;
     const Field& field_;
-    bool exact_;
+    bool exact_, beyondBand_;
 };
 
 }  // namespace bilayer::detail

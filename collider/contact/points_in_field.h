@@ -14,6 +14,7 @@
 #include "collider/contact/body_transform.h"
 #include "collider/contact/contact_cache.h"
 #include "collider/contact/contact_field.h"
+#include "collider/contact/contact_range.h"
 #include "collider/contact/edges_in_field.h"
 #include "collider/contact/motion.h"
 #include "collider/contact/normal_filter.h"
@@ -25,10 +26,11 @@ namespace bilayer::detail {
 
 class PointsInField {
   public:
-    PointsInField(const Placed& body, const Placed& other, const ContactOptions& options)
+    PointsInField(const Placed& body, const Placed& other, const ContactOptions& options, ContactRange range)
         : body_(body),
           other_(other),
-          surface_(other.collider, options.exact),
+          beyondBand_(options.exact || reachesBeyondBand(other, options.margin, range)),
+          surface_(other.collider, options.exact, beyondBand_),
           transform_(body, other),
           coarse_(transform_.intoCoarseCells(field())),
           relativeMotion_(body.pose, body.motion, other.pose, other.motion),
@@ -38,15 +40,16 @@ class PointsInField {
         const Bounds& bounds = body.collider.bounds();
         centre_ = bounds.centre();
         radius_ = 0.5f * glm::length(bounds.size());
-        speculative_ = maxDisplacement(centre_, radius_) >
-                       std::min(reach_, surelyInBand(field().exteriorWidth(), field().voxelSize()));
+        const float inBand = surelyInBand(field().exteriorWidth(), field().voxelSize());
+        speculative_ =
+            maxDisplacement(centre_, radius_) > (range == ContactRange::margin ? reach_ : std::min(reach_, inBand));
     }
 
     /// Calls found(index, point, sample) for the points within the margin of the surface, inside it, or predicted to
     /// hit it.
     template <class Found>
     void visit(CandidateLists::List* candidates, ContactReport& report, Found&& found) {
-        if (!candidates || speculative_ || options_.exact) return visitAll(report, found);
+        if (!candidates || speculative_ || beyondBand_) return visitAll(report, found);
         const float voxel = field().voxelSize();
         // voxels outside the band have no values: a list must not reach that far
         const float maxSlack =
@@ -116,7 +119,7 @@ class PointsInField {
         descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 cell = coarse_(point.position);
             const float distance = maxContactDistance(point.position, 0);
-            const bool isAbove = !options_.exact && clearance_.isAbove(cell, distance);  // or outside the band
+            const bool isAbove = !beyondBand_ && clearance_.isAbove(cell, distance);  // or outside the band
             if (isAbove || clearance_.isOutside(cell, minRejectedDistance(distance))) return;
             const glm::vec3 at = transform_(point.position);
             test(index, point, at, sampleAt(at, report), report, found);
@@ -211,6 +214,7 @@ class PointsInField {
     glm::vec3 displacementOf(const glm::vec3& at) const { return relativeMotion_.of(other_.scale * at) / other_.scale; }
 
     const Placed &body_, &other_;
+    bool beyondBand_;  // the other surface is searched for from points beyond its band, too
     ContactField surface_;
     BodyTransform transform_, coarse_;
     RelativeMotion relativeMotion_;

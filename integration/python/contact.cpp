@@ -70,7 +70,8 @@ constexpr const char* collideDoc =
 The contacts of two bodies: where surface points of each are within `margin` of the other.
 
 a, b: Collider or Shape, one of them a Collider. pose_a, pose_b: a Pose, a matrix of shape (4, 4), or None.
-margin: contacts are reported up to this separation, in the meshes' unit.
+margin: contacts are reported up to this separation, in the meshes' unit. Points beyond the band find the closest point
+of the surface, which is slower; half_width_voxels of margin / voxel_size + 1.74 makes a band that is wide enough.
 exact: take distances from the triangles everywhere.
 scale_a, scale_b: uniform scales, above 0.
 motion_a, motion_b: displacement and rotation vector over the step, shape (2, 3), for speculative contacts.
@@ -81,7 +82,8 @@ keep_oblique_edges: also keep contacts of face points with edges that they see o
 reduced: keep the few contacts of each patch that a solver needs, up to twelve.
 cache: the ContactCache of this pair, which makes the next call faster; reduced contacts then stay the same at rest.
 
-The answer is true, and has a length above 0, if there are contacts.
+The answer is true, and has a length above 0, if there are contacts. Points deeper inside than the band make none;
+beyond_band counts them.
 
 Raises ValueError that names the argument.
 

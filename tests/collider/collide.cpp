@@ -8,6 +8,7 @@
 #include <map>
 
 #include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
 #include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/contacts.h"
@@ -254,4 +255,68 @@ TEST_CASE("bodies that approach from beyond the band get contacts, at any margin
             CHECK(contact.approach == Approx(8 * h).margin(0.05 * h));
         }
     CHECK(corners >= 4);
+}
+
+namespace {
+
+// Surface points with a contact closer than the margin by more than `tolerance`, in ascending order.
+std::vector<std::uint32_t> pointsInContact(const Placed& a, const Placed& b, const ContactOptions& options,
+                                           float tolerance) {
+    std::vector<Contact> contacts;
+    collide(a, b, options, contacts);
+    std::vector<std::uint32_t> points;
+    for (const Contact& contact : contacts) {
+        const Placed& body = contact.feature & featureOfB ? b : a;
+        const bool isPoint = (contact.feature & ~featureOfB) < body.collider.data().points().points().size();
+        if (isPoint && contact.distance < options.margin - tolerance) points.push_back(contact.feature);
+    }
+    return points;
+}
+
+bool holds(const std::vector<std::uint32_t>& all, const std::vector<std::uint32_t>& some) {
+    return std::includes(all.begin(), all.end(), some.begin(), some.end());
+}
+
+}  // namespace
+
+TEST_CASE("a margin wider than the band has the contacts of a wide band") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const auto accuracy =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
+    // samples find the candidates in the band, and may differ by this from the triangles [voxels]
+    constexpr float tolerance = 0.87f;
+    // the normal filter may decide differently by samples and by triangles
+    const bool isExact = accuracy == ContactAccuracy::exact;
+    const Mesh torus = shapes::torus(0.35f, 0.13f), box = shapes::box({0.3f, 0.2f, 0.1f});
+    const auto collider = [&](const Mesh& mesh, float exterior) {
+        return Collider(mesh, build(mesh, {.voxelSize = h, .exteriorWidthVoxels = exterior}), {.accuracy = accuracy});
+    };
+    const Collider narrow[] = {collider(torus, 3), collider(box, 2)}, wide[] = {collider(torus, 14), collider(box, 14)};
+    std::size_t beyond = 0;
+    for (int i = 0; i < 60; ++i) {
+        const Placed a{narrow[0], randomPose(random, 0.5)};
+        const Placed b{narrow[i % 2], randomPose(random, 0.5), float(random(0.5, 2))};
+        const float margin = float(random(1, 9)) * h;
+        const ContactOptions options = isExact && i % 4 < 2 ? ContactOptions{.margin = margin} : unfiltered(margin);
+        const float near = tolerance * h * std::max(b.scale, 1.f);
+        const Placed wideA{wide[0], a.pose}, wideB{wide[i % 2], b.pose, b.scale};
+        const auto found = pointsInContact(a, b, options, 0), surely = pointsInContact(a, b, options, near);
+        CAPTURE(nameOf(accuracy), i, margin / h, b.scale);
+        CHECK(holds(pointsInContact(wideA, wideB, options, 0), surely));
+        CHECK(holds(found, pointsInContact(wideA, wideB, options, near)));
+        beyond += margin > 3 * h ? found.size() : 0;
+    }
+    CHECK(beyond > 1000);
+}
+
+TEST_CASE("without triangles, a margin wider than the band takes the distances of the zero set") {
+    const Mesh mesh = shapes::sphere(0.4f, 3);
+    const LevelSet levelSet = levelSetOf(sphereSolid(0.4), h);
+    const Collider body(withBody(levelSet, mesh, {}, false));
+    std::vector<Contact> contacts;
+    collide(body, {{0, 0, 0.8f + 3 * h}}, body, {}, {.margin = 4 * h}, contacts);
+    REQUIRE(contacts.size() > 10);
+    CHECK(minDistance(contacts) == Approx(3 * h).margin(0.05 * h));
 }

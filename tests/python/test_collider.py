@@ -64,6 +64,20 @@ def test_bad_matrices(collider, matrix):
         bilayer.distance(collider, None, collider, matrix)
 
 
+@pytest.mark.parametrize("accuracy", ["samples", "exact-near-features", "exact"])
+@pytest.mark.parametrize("height", [2.05, 2.07, 2.09])
+def test_margins_wider_than_the_band(accuracy, height):
+    ball = bilayer.sphere(1)
+    narrow, wide = (
+        bilayer.Collider(ball, bilayer.build(ball, resolution=64, half_width_voxels=width), accuracy=accuracy)
+        for width in (3, 8)
+    )
+    pose = bilayer.Pose((0, 0, height))
+    found, expected = (bilayer.collide(body, pose, body, None, margin=0.1) for body in (narrow, wide))
+    assert len(found) == len(expected) > 0
+    assert np.allclose(found.distance, expected.distance, atol=2e-3)
+
+
 def test_collider(box, box_set, collider, sphere):
     assert collider.margin == pytest.approx(0.0625) and collider.mesh == box
     assert collider.mass.volume == pytest.approx(8) and collider.field.voxel_size == 0.0625

@@ -8,6 +8,7 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/shape.h>
+#include "collider/contact/contact_range.h"
 #include "collider/contact/edge_probes.h"
 #include "collider/contact/narrow_phase.h"
 #include "collider/contact/predicted_contacts.h"
@@ -134,7 +135,7 @@ void Pair::find(const Side& a, const Side& b, float margin, bool exact) {
         options.minNormalCosineApart = options.minNormalCosine;
         options.keepsObliqueEdges = true;
     }
-    report_ = bilayer::collide(a.placed(), b.placed(), options, contacts_, &cache_);
+    report_ = collideWithin(ContactRange::band, a.placed(), b.placed(), options, contacts_, &cache_);
 }
 
 void Pair::finish(const Side& a, const Side& b) {
