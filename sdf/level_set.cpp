@@ -100,10 +100,16 @@ void requireLevelSet(const Grids& grids) {
         openvdb::Vec3d unit(0);
         unit[axis] = 1;
         const openvdb::Vec3d world = grid.indexToWorld(unit), step = world / h - origin;
-        if (!step.eq(unit, 1e-5) || !(std::abs(origin[axis] - std::round(origin[axis])) <= 1e-3) ||
-            !grid.worldToIndex(world).eq(unit, 1e-3))
+        if (!step.eq(unit, 1e-5) || !grid.worldToIndex(world).eq(unit, 1e-3))
             throw std::invalid_argument(
-                fmt::format("grid {} is rotated, mirrored or shifted by parts of a voxel", quotedWord(grid.getName())));
+                fmt::format("grid {} is rotated or mirrored: resample it (openvdb::tools::resampleToMatch())",
+                            quotedWord(grid.getName())));
+        if (!(std::abs(origin[axis] - std::round(origin[axis])) <= 1e-3))
+            throw std::invalid_argument(
+                fmt::format("grid {} is shifted by {:g} voxels along {}: voxels must be at whole multiples of their "
+                            "size. Shift the transform to these, or bilayer.LevelSet.from_numpy() takes its values "
+                            "with a field_origin",
+                            quotedWord(grid.getName()), origin[axis], "xyz"[axis]));
         require(std::abs(origin[axis]) <= maxOrigin, grid, "the shift", origin[axis], "at most 2^40 voxels");
     }
 }

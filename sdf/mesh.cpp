@@ -231,7 +231,13 @@ Mesh transformed(const Mesh& mesh, const glm::mat4& map) {
     Mesh result = mesh;
     const bool isFar = mesh.origin != glm::dvec3(0);
     const glm::mat4 near = isFar ? glm::mat4(glm::mat3(map)) : map;
-    for (auto& point : result.points) point = glm::vec3(near * glm::vec4(point, 1.f));
+    for (std::size_t i = 0; i < result.points.size(); ++i) {
+        glm::vec3& point = result.points[i];
+        const bool wasFinite = isFinite(point);
+        point = glm::vec3(near * glm::vec4(point, 1.f));
+        if (wasFinite && !isFinite(point))
+            throw std::invalid_argument(fmt::format("transformed(): vertex {} would be beyond the range of float", i));
+    }
     if (isFar) result.origin = glm::dvec3(glm::dmat4(map) * glm::dvec4(mesh.origin, 1));
     if (glm::determinant(glm::mat3(map)) < 0)
         for (auto& triangle : result.triangles) std::swap(triangle.y, triangle.z);

@@ -11,6 +11,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "integration/python/convert.h"
 #include "integration/python/without_gil.h"
 
 namespace bilayer::python {
@@ -18,9 +19,12 @@ namespace {
 
 constexpr std::size_t checkedAtOnce = 4096;  // floats that are checked without a branch
 
-// "a list", "an array of shape (2, 4) and dtype float64".
+// "a 'list' that is no array of numbers", "None", "shape (2, 4) and dtype float64".
 std::string description(const py::handle& object, const py::array& array) {
-    if (!array) return fmt::format("{} '{}' that is no array of numbers", "a", Py_TYPE(object.ptr())->tp_name);
+    if (!array) return typeText(object) + " that is no array of numbers";
+    const bool areObjects = array.dtype().kind() == 'O';
+    if (areObjects && py::hasattr(object, "numpy")) return typeText(object) + ": pass its .numpy()";
+    if (areObjects && array.ndim() == 0) return typeText(object);
     const Shape shape(array.shape(), array.shape() + array.ndim());
     return fmt::format("shape {} and dtype {}", text(shape), std::string(py::str(array.dtype())));
 }
@@ -29,8 +33,13 @@ std::string description(const py::handle& object, const py::array& array) {
     throw std::invalid_argument(fmt::format("{}: expected {}, got {}", name, expected, got));
 }
 
-// Null for an object that is no array.
-py::array arrayOf(const py::handle& object) {
+// Null for an object that is no array. Throws std::invalid_argument for an array with masked items, which would show.
+py::array arrayOf(const py::handle& object, const char* name) {
+    if (py::hasattr(object, "mask") && py::hasattr(object, "filled")) {
+        const py::object mask = py::module_::import("numpy").attr("ma").attr("getmaskarray")(object);
+        if (mask.attr("any")().cast<bool>())
+            refuse(name, "an array without masked items", "one with some: pass .compressed() or .filled()");
+    }
     return py::array::ensure(object);
 }
 
@@ -96,6 +105,16 @@ std::string expectation(const Shape& item, Items items) {
     return fmt::format("an array of real numbers of shape ({}{})", axes, comma ? "," : "");
 }
 
+py::array_t<double, py::array::c_style> doublesOf(const py::array& array) {
+    using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+    if (array.dtype().itemsize() <= py::ssize_t(sizeof(double))) return Doubles::ensure(array);
+    const py::object quiet = py::module_::import("numpy").attr("errstate")(py::arg("over") = "ignore");
+    quiet.attr("__enter__")();
+    const auto doubles = Doubles::ensure(array);
+    quiet.attr("__exit__")(py::none(), py::none(), py::none());
+    return doubles;
+}
+
 }  // namespace
 
 std::string text(const Shape& shape) {
@@ -106,7 +125,7 @@ std::string text(const Shape& shape) {
 
 Floats::Floats(const py::handle& object, const char* name, Shape item, Range range, Items items)
     : name_(name), item_(item) {
-    const py::array array = arrayOf(object);
+    const py::array array = arrayOf(object, name);
     const auto leading = array ? array.ndim() - py::ssize_t(item.size()) : -1;
     const bool fits = items == Items::any || leading == (items == Items::list ? 1 : 0);
     if (!array || std::string("fiu").find(array.dtype().kind()) == std::string::npos || !endsWith(array, item) || !fits)
@@ -126,9 +145,9 @@ void Floats::convert(const py::array& array, Range range) {
                                                 isTooLarge(value) ? "in the range of float32" : nameOf(range),
                                                 shape.empty() ? "" : fmt::format("; its shape is {}", text(shape))));
     };
-    // numpy would warn of each double beyond the range of floats
+    // numpy would warn of each double beyond the range of floats, and of each long double beyond that of doubles
     if (array.dtype().kind() == 'f' && array.dtype().itemsize() > py::ssize_t(sizeof(float))) {
-        const auto doubles = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(array);
+        const auto doubles = doublesOf(array);
         if (!doubles) refuse(name_, "numbers in the range of float32", description(array, array));
         array_ = py::array_t<float, py::array::c_style>(wholeShape());
         float* const to = array_.mutable_data();
@@ -141,6 +160,14 @@ void Floats::convert(const py::array& array, Range range) {
     if (!array_) throw py::error_already_set();
     const WithoutGil release;
     check(array_.data(), array_.size());
+}
+
+std::string Floats::place(std::size_t item) const {
+    return name_ + indexText(item, shape_);
+}
+
+std::string Floats::shapeText() const {
+    return shape_.empty() ? "" : "; its leading shape is " + text(shape_);
 }
 
 Shape Floats::wholeShape() const {
@@ -179,7 +206,7 @@ Shape broadcast(std::initializer_list<Floats*> arguments) {
 
 std::vector<std::uint32_t> indices(const py::handle& object, const char* name, py::ssize_t columns, std::uint64_t end,
                                    const char* what) {
-    const py::array array = arrayOf(object);
+    const py::array array = arrayOf(object, name);
     const std::string shape = columns == 1 ? "(N,)" : fmt::format("(N, {})", columns);
     const std::string expected = fmt::format("an array of integers of shape {}", shape);
     // an empty list has no second axis, and the dtype float64
@@ -193,14 +220,16 @@ std::vector<std::uint32_t> indices(const py::handle& object, const char* name, p
     if (!values) throw py::error_already_set();
     const std::int64_t* const data = values.data();
     const Shape whole(array.shape(), array.shape() + array.ndim());
+    const std::string allowed =
+        end > 0 ? fmt::format("{} of 0 to {}", what, end - 1) : fmt::format("{}, but there is none", what);
     const WithoutGil release;
     std::vector<std::uint32_t> result(static_cast<std::size_t>(values.size()));
     for (std::size_t i = 0; i < result.size(); ++i) {
         const auto value = std::uint64_t(data[i]);
         if (value >= end)
-            throw std::invalid_argument(fmt::format("{}{} is {}, and must be {} of 0 to {}", name, indexText(i, whole),
-                                                    isUnsigned ? std::to_string(value) : std::to_string(data[i]), what,
-                                                    std::int64_t(end) - 1));
+            throw std::invalid_argument(
+                fmt::format("{}{} is {}, and must be {}; its shape is {}", name, indexText(i, whole),
+                            isUnsigned ? std::to_string(value) : std::to_string(data[i]), allowed, text(whole)));
         result[i] = std::uint32_t(value);
     }
     return result;

@@ -54,6 +54,9 @@ class Floats {
     const char* name() const { return name_; }
     /// The leading axes: (4, 5) for points in an array of shape (4, 5, 3).
     const Shape& shape() const { return shape_; }
+    /// "directions[3, 1]" of an item, and "; its leading shape is (4, 5)", both after broadcasting, for errors.
+    std::string place(std::size_t item) const;
+    std::string shapeText() const;
     /// Repeats the items as numpy's broadcasting does. Throws std::invalid_argument if they do not fit.
     void broadcast(const Shape& shape);
 

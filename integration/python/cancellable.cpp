@@ -3,6 +3,7 @@
 
 #include <cxxabi.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,8 +30,12 @@ using Clock = std::chrono::steady_clock;
 
 /// How often a job's caller looks for signals and reports progress.
 constexpr std::chrono::milliseconds pollInterval(20);
-/// Parts of a batch that are answered before the first look for signals.
-constexpr std::size_t firstParts = 16;
+/// Rounds of a batch grow by this factor at most: items may take longer than those before them.
+constexpr double maxGrowth = 16;
+/// Parts for each core, so that none waits long for the last.
+constexpr std::size_t partsPerCore = 8;
+/// A part has no more groups than this.
+constexpr std::size_t maxGroups = 16;
 
 /// A thread that runs one job after another.
 class Worker {
@@ -148,11 +153,14 @@ void runCancellable(const py::object& progress, const std::function<void(const L
     if (cancelled || !report(progress, 1)) throw Cancelled();  // requested in the last moment
 }
 
-void answerInParts(std::size_t count, std::size_t part,
+void answerInParts(std::size_t count, std::size_t group,
                    const std::function<void(std::size_t begin, std::size_t end)>& answer) {
-    std::size_t round = firstParts * part;  // items between two looks for signals
+    const auto cores = std::size_t(tbb::this_task_arena::max_concurrency());
+    std::size_t round = group;  // items between two looks for signals
     for (std::size_t begin = 0; begin < count;) {
         const std::size_t end = begin + std::min(round, count - begin);
+        const std::size_t part =
+            std::clamp((end - begin) / (partsPerCore * cores) / group, std::size_t(1), maxGroups) * group;
         const Clock::time_point start = Clock::now();
         {
             const WithoutGil release;
@@ -162,9 +170,9 @@ void answerInParts(std::size_t count, std::size_t part,
                 tbb::parallel_for(begin, end, part, [&](std::size_t i) { answer(i, std::min(i + part, end)); });
         }
         if (end < count) throwIfSignalled();
-        const auto took = Clock::now() - start;
-        if (took < pollInterval) round *= 2;
-        if (took > 4 * pollInterval) round = std::max(part, round / 2 / part * part);
+        const std::chrono::duration<double> took = Clock::now() - start;
+        const double growth = std::min(std::chrono::duration<double>(pollInterval) / took, maxGrowth);
+        round = std::max<std::size_t>(std::size_t(double(round) * growth) / group, 1) * group;
         begin = end;
     }
 }

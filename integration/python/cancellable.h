@@ -30,12 +30,12 @@ auto cancellable(const py::object& progress, Job job) {
     return std::move(*result);
 }
 
-/// Answers a batch in parts on all cores, without the GIL, and looks for Ctrl-C every few of them. Call this with the
-/// GIL held.
-/// @param part    count of the items of a part; the last part may be smaller
+/// Answers a batch in parts on all cores, without the GIL, and looks for Ctrl-C after the first group and then about
+/// every 20 ms. Call this with the GIL held.
+/// @param group   count of items that stay together: parts are whole groups, but for the last
 /// @param answer  answers the items of [begin, end); called from any thread, concurrently
 /// Throws what `answer` throws, and what a signal handler raises.
-void answerInParts(std::size_t count, std::size_t part,
+void answerInParts(std::size_t count, std::size_t group,
                    const std::function<void(std::size_t begin, std::size_t end)>& answer);
 
 }  // namespace bilayer::python

@@ -124,7 +124,8 @@ point_spacing_voxels: distance between neighbouring surface points, in voxels.
 margin: contacts are created up to this separation, in the mesh's unit; None for one voxel.
 accuracy: "samples", "exact-near-features" or "exact": where contacts take distances from the triangles.
 
-Raises ValueError for options out of range, and if the level set belongs to another mesh.
+Raises ValueError for options out of range, and if the level set belongs to another mesh. A level set without a
+mesh_hash, as of other programs, is not checked.
 
 >>> import bilayer
 >>> box = bilayer.box()

@@ -13,11 +13,13 @@ std::string withArticle(const std::string& noun) {
     return (std::string_view("AEIOaeio").find(noun.front()) == std::string_view::npos ? "a " : "an ") + noun;
 }
 
+std::string typeText(const py::handle& object) {
+    if (object.is_none()) return "None";
+    return fmt::format("a '{}'", py::str(py::type::of(object).attr("__name__")).cast<std::string>());
+}
+
 void refuseType(const char* name, const std::string& expected, const py::handle& got) {
-    throw std::invalid_argument(fmt::format(
-        "{}: expected {}, got {}", name, expected,
-        got.is_none() ? "None"
-                      : fmt::format("a '{}'", py::str(py::type::of(got).attr("__name__")).cast<std::string>())));
+    throw std::invalid_argument(fmt::format("{}: expected {}, got {}", name, expected, typeText(got)));
 }
 
 double numberOf(const py::handle& object, const char* name, bool single) {

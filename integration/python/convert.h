@@ -17,6 +17,9 @@ namespace bilayer::python {
 
 namespace py = pybind11;
 
+/// "None", "a 'str'".
+std::string typeText(const py::handle& object);
+
 /// Throws std::invalid_argument: "NAME: expected EXPECTED, got a 'str'".
 [[noreturn]] void refuseType(const char* name, const std::string& expected, const py::handle& got);
 

@@ -24,9 +24,9 @@ namespace {
 
 constexpr std::array<std::pair<const char*, Storage>, 2> storages{
     {{"float32", Storage::float32}, {"fixed16", Storage::fixed16}}};
-/// Queries of a part of a batch. Closest points are found in groups of 64, which parts must not cut: any of several
-/// equally close features may be the answer, and it must be the library's.
-constexpr std::size_t part = 1024;
+/// Queries that parts of a batch must not separate. Closest points are found in groups of 64: any of several equally
+/// close features may be the answer, and it must be the library's.
+constexpr std::size_t group = 64;
 
 // A hit as numpy sees it.
 struct Hit {
@@ -39,7 +39,7 @@ struct Hit {
 py::object sample(const FieldObject& field, const py::object& object) {
     const Floats points(object, "points", {3});
     std::vector<Sample> samples(points.points().size());
-    answerInParts(samples.size(), part, [&](std::size_t begin, std::size_t end) {
+    answerInParts(samples.size(), group, [&](std::size_t begin, std::size_t end) {
         field.sample(points.points().subspan(begin, end - begin), std::span(samples).subspan(begin, end - begin));
     });
     const Records<Sample> records(std::move(samples), points.shape());
@@ -66,7 +66,7 @@ py::object closest(const FieldObject& field, const py::object& object, const py:
     const bool one = limits.shape().empty();
     const Shape shape = one ? points.shape() : broadcast({&points, &limits});
     std::vector<ClosestPoint> answers(points.points().size());
-    answerInParts(answers.size(), part, [&](std::size_t begin, std::size_t end) {
+    answerInParts(answers.size(), group, [&](std::size_t begin, std::size_t end) {
         const auto reach = limits.as<float>();
         const auto found = std::span(answers).subspan(begin, end - begin);
         closestOf(field, points.points().subspan(begin, end - begin), one ? reach : reach.subspan(begin, end - begin),
@@ -85,7 +85,7 @@ template <class Ask>
 py::object flags(const Shape& shape, const Ask& ask) {
     py::array_t<bool> array(shape);
     bool* const answers = array.mutable_data();
-    answerInParts(std::size_t(array.size()), part, [&](std::size_t begin, std::size_t end) {
+    answerInParts(std::size_t(array.size()), group, [&](std::size_t begin, std::size_t end) {
         ask(begin, end - begin, std::span(answers + begin, end - begin));
     });
     return shape.empty() ? array[py::tuple()] : py::object(array);
@@ -102,7 +102,7 @@ py::object inside(const FieldObject& field, const py::object& object) {
 template <class Cast>
 py::object hits(const Shape& shape, std::size_t count, const Cast& cast) {
     std::vector<Hit> all(count);
-    answerInParts(count, part, [&](std::size_t begin, std::size_t end) {
+    answerInParts(count, group, [&](std::size_t begin, std::size_t end) {
         std::vector<std::optional<RayHit>> found(end - begin);
         cast(begin, end - begin, std::span(found));
         for (std::size_t i = begin; i < end; ++i)
@@ -128,7 +128,8 @@ struct Rays {
         for (std::size_t k = 0; k < count; ++k) {
             const std::size_t i = begin + k;
             if (along[i] == glm::vec3(0))
-                throw std::invalid_argument(fmt::format("directions: direction {} is zero", i));
+                throw std::invalid_argument(directions.place(i) + " is zero, and must be a direction" +
+                                            directions.shapeText());
             rays[k] = {from[i], along[i], reach[i]};
         }
         return rays;
@@ -184,7 +185,9 @@ py::object overlapsBox(const FieldObject& field, const py::object& centres, cons
             const std::size_t i = begin + k;
             const glm::vec4& q = quaternions[i];
             if (std::abs(glm::dot(q, q) - 1) > detail::unitTolerance)
-                throw std::invalid_argument(fmt::format("rotations: quaternion {} is not of length 1", i));
+                throw std::invalid_argument(
+                    fmt::format("{} is a quaternion of length {:g}, and must be one of length 1{}", rotation.place(i),
+                                glm::length(q), rotation.shapeText()));
             boxes[k] = {centre.points()[i], half.points()[i], glm::quat(q.x, q.y, q.z, q.w)};  // w, x, y, z
         }
         field.overlapsBox(boxes, answers);

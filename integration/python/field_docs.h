@@ -20,8 +20,9 @@ needed.
 Coordinates are those of Mesh.vertices. For points of the world, ask with points - field.origin, in float64; the origin
 is zero unless the mesh has one, as a mesh file far from zero.
 
-Raises ValueError if the level set belongs to another mesh. Queries raise ValueError that names the argument for a wrong
-shape or dtype, and for a value that is not finite.
+Raises ValueError if the level set belongs to another mesh; one without a mesh_hash, as of other programs, is not
+checked. Queries raise ValueError that names the argument for a wrong shape or dtype, and for a value that is not
+finite.
 
 >>> import bilayer
 >>> box = bilayer.box((2, 2, 2))

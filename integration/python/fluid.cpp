@@ -204,6 +204,23 @@ Obstacle makeObstacle(const py::object& solid, double voxelSize, const py::objec
     });
 }
 
+template <class Grid>
+bool same(const Grid& a, const Grid& b) {
+    if (a.transform() != b.transform() || a.background() != b.background() || !a.tree().hasSameTopology(b.tree()))
+        return false;
+    auto other = b.tree().cbeginValueAll();
+    for (auto one = a.tree().cbeginValueAll(); one; ++one, ++other)
+        if (!(*one == *other)) return false;
+    return true;
+}
+
+bool equal(const Obstacle& a, const Obstacle& b) {
+    const WithoutGil release;
+    const fluid::Solid &one = a.solid(), &other = b.solid();
+    return same(*one.distance, *other.distance) && same(*one.velocity, *other.velocity) &&
+           same(*one.openFaces, *other.openFaces) && same(*one.openVolume, *other.openVolume);
+}
+
 // The obstacle of grids in the order of Obstacle::grids().
 Obstacle unpacked(const py::object& bytes) {
     const openvdb::GridPtrVec grids = gridsOf(bytes);
@@ -313,6 +330,7 @@ True
             "float64 (3,): world coordinates of the centre of cell [0, 0, 0].")
         .def_property_readonly("voxel_size", &Obstacle::voxelSize, "Edge of a cell.")
         .def("__repr__", &Obstacle::text)
+        .def("__eq__", equal, py::is_operator())
         .def("__copy__", [](const Obstacle& self) { return self; })
         .def(
             "__deepcopy__", [](const Obstacle& self, const py::dict&) { return self; }, py::arg("memo"));

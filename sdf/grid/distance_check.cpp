@@ -63,7 +63,11 @@ class DistanceCheck {
         auto tile = grid_.tree().cbeginValueAll();
         tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
         for (; tile; ++tile) {
-            if (tile.isValueOn()) refuse("has an active tile: a band is active voxel by voxel");
+            if (tile.isValueOn())
+                refuse(
+                    fmt::format("has an active tile of {:g}, but a band is active voxel by voxel: call "
+                                "tree().voxelizeActiveTiles(), or bilayer.LevelSet.from_numpy() with its values",
+                                *tile));
             check(*tile, false);
         }
     }

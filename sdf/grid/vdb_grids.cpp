@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 #include <openvdb/io/Stream.h>
+#include <openvdb/tree/LeafManager.h>
 
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <stdexcept>
@@ -13,6 +15,7 @@
 #include "sdf/base/quoted_text.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/mapped_file.h"
+#include "sdf/io/vdb_archive.h"
 #include "sdf/io/vdb_checksum.h"
 #include "sdf/io/vdb_lengths.h"
 
@@ -23,7 +26,7 @@ namespace {
 constexpr double maxVoxelRounding = 1e-5;
 
 template <class Grid>
-typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
+typename Grid::Ptr first(const openvdb::GridPtrVec& grids, auto accept) {
     for (const auto& base : grids)
         if (auto grid = openvdb::gridPtrCast<Grid>(base); grid && accept(*grid)) return grid;
     return nullptr;
@@ -51,6 +54,24 @@ void requireVoxels(const openvdb::GridBase& grid) {
         "grid {} lies {:.3g} voxels from zero, where a file rounds voxels by {:.1g} of their size and {:g} is "
         "allowed: move the mesh closer to zero, or take larger voxels",
         quotedWord(grid.getName()), away, rounding, maxVoxelRounding));
+}
+
+/// Deactivates the voxels and tiles of a dense array that other programs clamp to the width of the band: they hold no
+/// distance.
+void deactivateClamped(openvdb::FloatGrid& grid) {
+    if (grid[metadata::interiorWidth] || grid[metadata::version]) return;
+    const float width = grid.background(), rounding = halfRounding * width;
+    auto tile = grid.tree().beginValueOn();
+    tile.setMaxDepth(openvdb::FloatTree::ValueOnIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile)
+        if (std::isfinite(*tile) && std::abs(*tile) >= width - rounding) {
+            tile.setValue(std::copysign(width, *tile));
+            tile.setActiveState(false);
+        }
+    openvdb::tree::LeafManager<openvdb::FloatTree>(grid.tree()).foreach ([&](auto& leaf, std::size_t) {
+        for (auto voxel = leaf.beginValueOn(); voxel; ++voxel)
+            if (std::abs(*voxel) == width) voxel.setValueOff();
+    });
 }
 
 /// Returns the origin of the mesh from which a field in a file was built.
@@ -83,8 +104,10 @@ std::shared_ptr<Grids> readGrids(const std::filesystem::path& path) {
     const glm::dvec3 origin = originOf(grids);
     for (const auto& grid : grids) shift(*grid, -origin);
     auto result = std::make_shared<Grids>();
-    result->distance = first<openvdb::FloatGrid>(
+    const auto distance = first<openvdb::FloatGrid>(
         grids, [](const auto& grid) { return grid.getGridClass() == openvdb::GRID_LEVEL_SET; });
+    if (distance) deactivateClamped(*distance);
+    result->distance = distance;
     if (!result->distance) throw std::runtime_error(fmt::format("{}: holds no level set", path.string()));
     result->triangle = first<openvdb::Int32Grid>(grids, [](const auto& grid) { return grid.getName() == "triangle"; });
     for (const auto& grid : grids)

@@ -166,6 +166,7 @@ def test_mypy(tmp_path):
         pytest.skip("mypy is not installed")
     user = tmp_path / "user.py"
     user.write_text(
+        "from typing import Optional\n"
         "import numpy as np\n"
         "import bilayer\n"
         "field = bilayer.Field(bilayer.build(bilayer.box(), resolution=8), bilayer.box())\n"
@@ -174,6 +175,14 @@ def test_mypy(tmp_path):
         "reveal_type(bilayer.read_mesh('a.obj').faces)\n"
         "bilayer.distances([], np.zeros((3, 4, 4)), [[0, 1]])\n"
         "bilayer.mass_properties((np.zeros((3, 3)), [[0, 1, 2]]))\n"
+        "width: Optional[float] = 3\n"
+        "bilayer.build([[[0, 0, 0]], [[0, 0, 0]]], resolution=width, half_width_voxels=np.float32(3))\n"
+        "bilayer.build(bilayer.box(), voxel_size=np.int64(1), threads=np.int32(1))\n"
+        "body = bilayer.Collider(bilayer.box(), bilayer.build(bilayer.box(), resolution=8))\n"
+        "bilayer.distances((body for _ in range(2)), (bilayer.Pose() for _ in range(2)), [[0, 1]])\n"
+        "bilayer.LevelSet()  # wrong\n"
+        "bilayer.Shape()  # wrong\n"
+        "bilayer.Obstacle()  # wrong\n"
         "bilayer.build(bilayer.box(), resolutoin=3)  # wrong\n"
         "bilayer.build(bilayer.box())  # wrong\n"
         "bilayer.build(bilayer.box(), resolution=3, voxel_size=1)  # wrong\n"
@@ -190,7 +199,7 @@ def test_mypy(tmp_path):
     assert "unsignedinteger[numpy._typing._32Bit]" in result.stdout
     lines = user.read_text().splitlines()
     wrong = [number for number, line in enumerate(lines, 1) if "# wrong" in line]
-    assert len(wrong) == 6
+    assert len(wrong) == 9
     assert sorted(set(map(int, re.findall(r"user.py:(\d+): error:", result.stdout)))) == wrong, result.stdout
 
 

@@ -3,6 +3,7 @@
 
 import copy
 import pickle
+import signal
 import subprocess
 import sys
 
@@ -130,7 +131,7 @@ def test_rays_are_broadcast(box_field):
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        (([0, 0, 0], [0, 0, 0]), "directions: direction 0 is zero"),
+        (([0, 0, 0], [0, 0, 0]), "directions is zero, and must be a direction"),
         (([0, 0, 0], [0, 0]), "directions: expected"),
         (([0, 0], [0, 0, 1]), "origins: expected"),
         (([0, 0, 0], [0, 0, 1], -1), "max_distance is -1, and must be 0 or above"),
@@ -164,7 +165,7 @@ def test_overlaps(box_field):
     assert box_field.overlaps_box([[2, 0, 0], [2, 0, 0]], [[0.9, 1, 1], [1.1, 1, 1]]).tolist() == [False, True]
     turned = [np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8)]
     assert not box_field.overlaps_box([2.2, 0, 0], [1, 1, 1]) and box_field.overlaps_box([2.2, 0, 0], [1, 1, 1], turned)
-    with pytest.raises(ValueError, match="rotations: quaternion 0 is not of length 1"):
+    with pytest.raises(ValueError, match="rotations is a quaternion of length 1.41421, and must be one of length 1"):
         box_field.overlaps_box([0, 0, 0], [1, 1, 1], [1, 1, 0, 0])
     with pytest.raises(ValueError, match=r"half_sizes\[0\] is -1"):
         box_field.overlaps_box([0, 0, 0], [-1, 1, 1])
@@ -195,7 +196,7 @@ def test_long_batches_equal_single_queries(sphere_field, random):
     assert np.array_equal(rays.triangle[few], sphere_field.raycast(points[few], -points[few]).triangle)
     directions = points.copy()
     directions[30_000] = 0
-    with pytest.raises(ValueError, match="directions: direction 30000 is zero"):
+    with pytest.raises(ValueError, match=r"directions\[30000\] is zero, and must be a direction; its leading shape is \(\d+,\)"):
         sphere_field.raycast(points, directions)
 
 
@@ -327,3 +328,53 @@ def test_points_of_the_world(tmp_path):
     collider = bilayer.Collider(mesh, level_set)
     assert np.array_equal(collider.field.origin, mesh.origin) and np.array_equal(field.mesh.origin, mesh.origin)
     assert np.allclose(collider.mass.centre + collider.field.origin, there, atol=1e-5)
+
+
+def test_signals_without_a_mesh():
+    field = bilayer.Field(bilayer.build(bilayer.sphere(1, 5), resolution=100))
+    points = np.random.default_rng(0).uniform(-1.5, 1.5, (16 * 1024, 3))
+    seen = []
+    previous = signal.signal(signal.SIGALRM, lambda *_: seen.append(True))
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.02, 0.02)
+        field.closest(points)  # takes half a second or more
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+    assert len(seen) > 3
+
+
+class Tensor:
+    """As Open3D's, which numpy takes for an array of objects."""
+
+    def __len__(self):
+        return 1
+
+    def __getitem__(self, index):
+        if index > 0:
+            raise IndexError
+        return [object(), object(), object()]
+
+    def numpy(self):
+        return np.zeros((1, 3))
+
+
+@pytest.mark.parametrize(
+    "points, message",
+    [
+        (None, "got None"),
+        ({}, "got a 'dict'"),
+        ({1, 2, 3}, "got a 'set'"),
+        (Tensor(), r"got a 'Tensor': pass its \.numpy\(\)"),
+        ([np.longdouble("1e4000"), 0, 0], r"\[0\] is inf"),
+        (np.ma.masked_less([[0.0, 0, 1]], 1), r"without masked items, got one with some: pass \.compressed\(\)"),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_what_is_no_array_of_numbers(box_field, points, message):
+    with pytest.raises(ValueError, match=f"points.*{message}"):
+        box_field.sample(points)
+
+
+def test_masked_arrays_without_masked_items(box_field):
+    assert box_field.sample(np.ma.array([[0.0, 0, 1]])).distance.shape == (1,)

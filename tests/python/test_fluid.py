@@ -155,6 +155,8 @@ def test_obstacle(tmp_path):
         assert np.array_equal(again.distance, obstacle.distance) and np.array_equal(again.origin, obstacle.origin)
         assert np.array_equal(again.open_faces, obstacle.open_faces)
         assert np.array_equal(again.velocity, obstacle.velocity)
+        assert again == obstacle
+    assert obstacle != bilayer.obstacle(ball, 0.05, velocity=(0, 0, 3)) and obstacle != 1
     assert repr(obstacle) == "Obstacle({} x {} x {} cells of 0.05)".format(*shape)
     obstacle.save(tmp_path / "solid.vdb")
     assert bilayer.LevelSet.load(tmp_path / "solid.vdb").voxel_size == pytest.approx(0.05)

@@ -50,6 +50,28 @@ def test_openvdb(tmp_path, box_set):
     assert bilayer.mass_properties(loaded).volume == pytest.approx(4 / 3 * np.pi, rel=0.001)
 
 
+def test_openvdb_dense(tmp_path):
+    openvdb = pytest.importorskip("pyopenvdb")
+    path = str(tmp_path / "dense.vdb")
+    places = np.stack(np.meshgrid(*3 * [np.arange(-40, 41)], indexing="ij"), axis=-1)
+    distances = 0.1 * np.linalg.norm(places, axis=-1) - 2.5
+    grid = openvdb.FloatGrid(0.3)
+    values = np.clip(distances.astype(np.float32), np.float32(-0.3), np.float32(0.3))
+    grid.copyFromArray(values, ijk=(-40, -40, -40))
+    grid.transform, grid.gridClass = openvdb.createLinearTransform(0.1), openvdb.GridClass.LEVEL_SET
+    openvdb.write(path, grids=[grid])
+    loaded = bilayer.LevelSet.load(path)
+    assert loaded.active_voxels == (np.abs(values) < np.float32(0.3)).sum()
+    assert bilayer.Field(loaded).sample([2.6, 0, 0]).distance == pytest.approx(0.1)
+    assert not bilayer.Field(loaded).sample([0, 0, 0]).in_band
+    transform = openvdb.createLinearTransform(0.1)
+    transform.translate((0.03, 0, 0))
+    grid.transform = transform
+    openvdb.write(path, grids=[grid])
+    with pytest.raises(RuntimeError, match="shifted by 0.3 voxels along x.*from_numpy.. takes its values"):
+        bilayer.LevelSet.load(path)
+
+
 def test_scikit_image(sphere_set):
     measure = pytest.importorskip("skimage.measure")
     values, origin, spacing = sphere_set.to_numpy()

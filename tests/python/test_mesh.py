@@ -48,7 +48,8 @@ def test_arrays_of_any_layout():
         ([[0, 0, 0], [1, 0]], TRIANGLE[1], "vertices: expected an array"),
         ([[0, 0, 0], [1, np.nan, 0], [0, 1, 0]], TRIANGLE[1], r"vertices\[1, 1\] is nan, and must be finite"),
         ([[0, 0, 0], [1, 0, np.inf], [0, 1, 0]], TRIANGLE[1], r"vertices\[1, 2\] is inf"),
-        (TRIANGLE[0], [[0, 1, 3]], r"faces\[0, 2\] is 3, and must be a vertex of 0 to 2"),
+        (TRIANGLE[0], [[0, 1, 3]], r"faces\[0, 2\] is 3, and must be a vertex of 0 to 2; its shape is \(1, 3\)"),
+        (np.empty((0, 3)), [[0, 1, 2]], r"faces\[0, 0\] is 0, and must be a vertex, but there is none"),
         (TRIANGLE[0], [[0, 1, -1]], r"faces\[0, 2\] is -1"),
         (TRIANGLE[0], [[0, 1]], r"faces: expected .* shape \(N, 3\), got shape \(1, 2\)"),
         (TRIANGLE[0], np.zeros((0, 7)), r"faces: expected .* shape \(N, 3\), got shape \(0, 7\)"),
@@ -219,7 +220,7 @@ def test_meshes_of_other_packages(box):
         (SimpleNamespace(points=[[0, 0, 0]], cells=None), "got a 'SimpleNamespace' whose data are others"),
         (SimpleNamespace(points=[[0, 0, 0]], cells=[3]), "got a 'SimpleNamespace' whose data are others"),
         (SimpleNamespace(points=[[0, 0, 0]], faces=[5, 0, 0, 0, 0, 0]), "3 or 4 corners, got one of 5"),
-        (SimpleNamespace(points=[[0, 0, 0]], faces=[3, 0, 0]), "3 or 4 corners, got one of 3"),
+        (SimpleNamespace(points=[[0, 0, 0]], faces=[3, 0, 0]), r"expected 3 corners after .faces\[0\], got 2"),
         (SimpleNamespace(points=[[0, 0, 0]], faces=[[0, 0, 0]]), r"expected .faces as flat integers"),
         (SimpleNamespace(points=[[0, 0, 0]], faces=None), r"expected .faces as flat integers"),
         (SimpleNamespace(vertex={}, triangle={}), "got a 'SimpleNamespace' whose data are others"),
@@ -248,3 +249,17 @@ def test_spheres():
     for radius, subdivisions in ((0, 1), (np.inf, 1), (1, 10), (1, -1), ("x", 1), (1, 2.5)):
         with pytest.raises(ValueError, match="radius is|subdivisions is"):
             bilayer.sphere(radius, subdivisions)
+
+
+def test_transformed_beyond_float(sphere):
+    large = sphere.transformed(np.diag([3e38, 1, 1, 1]))
+    with pytest.raises(ValueError, match="vertex 0 would be beyond the range of float"):
+        large.transformed(np.diag([9, 1, 1, 1]))
+
+
+def test_polydata_cut_short():
+    class PolyData:
+        points, faces = np.zeros((3, 3)), np.array([3, 0, 1])
+
+    with pytest.raises(ValueError, match=r"expected 3 corners after \.faces\[0\], got 2"):
+        bilayer.as_mesh(PolyData())

@@ -128,6 +128,12 @@ TEST_CASE("a mirror turns triangles around") {
     CHECK(moved.points[1] == glm::vec3(2, 2, 3));
 }
 
+TEST_CASE("a map that takes a vertex beyond float is refused") {
+    const Mesh large = transformed(triangle(), glm::scale(glm::mat4(1), glm::vec3(3e38f, 1, 1)));
+    CHECK_THROWS_WITH(transformed(large, glm::scale(glm::mat4(1), glm::vec3(9, 1, 1))),
+                      Catch::Contains("vertex 1 would be beyond the range of float"));
+}
+
 TEST_CASE("the hash changes with every part of a mesh") {
     const Mesh sphere = shapes::sphere(1.f, 5);
     Mesh other = sphere;

@@ -3,6 +3,7 @@
 
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/Dense.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -241,6 +242,37 @@ TEST_CASE("a file with a distance that is no number is refused") {
     }
 }
 
+TEST_CASE("the clamped values of another program's dense array are not in the band") {
+    openvdb::initialize();
+    const float width = 3 * 0.1f;
+    openvdb::math::CoordBBox box(openvdb::Coord(-40), openvdb::Coord(40));
+    openvdb::tools::Dense<float> values(box);
+    std::size_t inBand = 0;
+    for (auto place = box.begin(); place; ++place) {
+        const double distance = (*place).asVec3d().length() * 0.1 - 2.5;  // of a ball
+        inBand += std::abs(float(distance)) < width;
+        values.setValue(*place, std::clamp(float(distance), -width, width));
+    }
+    const auto grid = openvdb::FloatGrid::create(width);
+    openvdb::tools::copyFromDense(values, *grid, 0.f);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    REQUIRE(grid->tree().activeTileCount() > 0);
+    const auto path = test::scratch("dense.vdb");
+    openvdb::io::File(path.string()).write({grid});
+    const LevelSet read = readVdb(path);
+    CHECK(read.activeVoxels() == inBand);
+    const auto& tree = read.grids().distance->tree();
+    CHECK(tree.activeTileCount() == 0);
+    CHECK(tree.getValue({0, 0, 0}) == -width);
+    CHECK(tree.getValue({24, 0, 0}) == Approx(-0.1));
+
+    grid->sparseFill(openvdb::CoordBBox({64, 0, 0}, {71, 7, 7}), 0.1f);
+    openvdb::io::File(path.string()).write({grid});
+    CHECK_THROWS_WITH(readVdb(path),
+                      Catch::Contains("an active tile of 0.1") && Catch::Contains("voxelizeActiveTiles"));
+}
+
 TEST_CASE("a rotated or empty grid is no level set to us") {
     const auto grids = [](auto change) {
         auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(torus().grids().distance)->deepCopy();
@@ -252,10 +284,10 @@ TEST_CASE("a rotated or empty grid is no level set to us") {
                     std::invalid_argument);
     CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.transform().postScale(openvdb::Vec3d(1, 2, 1)); })),
                     std::invalid_argument);
-    CHECK_THROWS_AS(LevelSet(grids([](auto& grid) {
-                        grid.transform().postTranslate({0.02, 0, 0});
-                    })),
-                    std::invalid_argument);
+    CHECK_THROWS_WITH(LevelSet(grids([](auto& grid) {
+                          grid.transform().postTranslate({0, 0.3 * grid.voxelSize()[0], 0});
+                      })),
+                      Catch::Contains("shifted by 0.3 voxels along y") && Catch::Contains("field_origin"));
     CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.clear(); })), std::invalid_argument);
     CHECK_THROWS_AS(LevelSet(std::make_shared<Grids>()), std::invalid_argument);
 }

@@ -1,9 +1,9 @@
-from typing import Any, Dict, List, Optional, Sequence, Union, overload
+from typing import Any, Dict, Iterable, List, NoReturn, Optional, SupportsIndex, Union, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bilayer._types import Accuracy, MeshLike, Method, Mode, Path, Progress, Sign, Storage
+from bilayer._types import Accuracy, MeshLike, Method, Mode, Path, Progress, Real, Sign, Storage
 from bilayer.results import (
     BodyDistance,
     ClosestPoints,
@@ -46,6 +46,7 @@ class Mesh:
     def __deepcopy__(self, memo: Dict[int, Any]) -> Mesh: ...
 
 class LevelSet:
+    def __new__(cls, _: NoReturn) -> LevelSet: ...  # functions make it
     @property
     def voxel_size(self) -> float: ...
     @property
@@ -72,16 +73,16 @@ class LevelSet:
     def has_triangles(self) -> bool: ...
     @property
     def metadata(self) -> Dict[str, Any]: ...
-    def to_numpy(self, padding: int = 1) -> Dense: ...
+    def to_numpy(self, padding: SupportsIndex = 1) -> Dense: ...
     def sparse(self) -> Sparse: ...
-    def surface(self, isovalue: float = 0, adaptivity: float = 0) -> Mesh: ...
-    def extended(self, distance: Optional[float] = None) -> LevelSet: ...
+    def surface(self, isovalue: Real = 0, adaptivity: Real = 0) -> Mesh: ...
+    def extended(self, distance: Optional[Real] = None) -> LevelSet: ...
     def save(self, path: Path, half_float: bool = False) -> None: ...
     @staticmethod
     def from_numpy(
         values: ArrayLike,
         origin: ArrayLike = ...,
-        spacing: float = 1,
+        spacing: Real = 1,
         *,
         half_width: Optional[ArrayLike] = None,
         field_origin: ArrayLike = ...,
@@ -155,8 +156,8 @@ class Collider:
         mesh: MeshLike,
         level_set: LevelSet,
         *,
-        point_spacing_voxels: float = 2,
-        margin: Optional[float] = None,
+        point_spacing_voxels: Real = 2,
+        margin: Optional[Real] = None,
         accuracy: Accuracy = "exact-near-features",
     ) -> None: ...
     @staticmethod
@@ -178,28 +179,30 @@ class ContactCache:
     def __init__(self) -> None: ...
 
 class Shape:
+    def __new__(cls, _: NoReturn) -> Shape: ...  # functions make it
     @staticmethod
-    def sphere(radius: float) -> Shape: ...
+    def sphere(radius: Real) -> Shape: ...
     @staticmethod
     def box(half_extents: ArrayLike) -> Shape: ...
     @staticmethod
-    def capsule(radius: float, half_height: float) -> Shape: ...
+    def capsule(radius: Real, half_height: Real) -> Shape: ...
     @staticmethod
-    def cylinder(radius: float, half_height: float) -> Shape: ...
+    def cylinder(radius: Real, half_height: Real) -> Shape: ...
     @staticmethod
-    def cone(radius: float, half_height: float) -> Shape: ...
+    def cone(radius: Real, half_height: Real) -> Shape: ...
     @staticmethod
-    def hull(points: ArrayLike, radius: float = 0) -> Shape: ...
+    def hull(points: ArrayLike, radius: Real = 0) -> Shape: ...
     @staticmethod
     def spheres(centres: ArrayLike, radii: ArrayLike) -> Shape: ...
     @staticmethod
-    def plane(normal: ArrayLike, offset: float = 0) -> Shape: ...
+    def plane(normal: ArrayLike, offset: Real = 0) -> Shape: ...
     @staticmethod
     def triangles(mesh: MeshLike) -> Shape: ...
     def __copy__(self) -> Shape: ...
     def __deepcopy__(self, memo: Dict[int, Any]) -> Shape: ...
 
 class Obstacle:
+    def __new__(cls, _: NoReturn) -> Obstacle: ...  # functions make it
     @property
     def distance(self) -> _Floats: ...
     @property
@@ -213,32 +216,33 @@ class Obstacle:
     @property
     def voxel_size(self) -> float: ...
     def save(self, path: Path) -> None: ...
+    def __eq__(self, other: object) -> bool: ...
     def __copy__(self) -> Obstacle: ...
     def __deepcopy__(self, memo: Dict[int, Any]) -> Obstacle: ...
 
 def read_mesh(path: Path) -> Mesh: ...
-def inspect(mesh: MeshLike, wall: float = 0) -> MeshReport: ...
+def inspect(mesh: MeshLike, wall: Real = 0) -> MeshReport: ...
 @overload
 def build(
     mesh: MeshLike,
     *,
-    resolution: float,
+    resolution: Optional[Real],
     voxel_size: None = None,
-    half_width: Optional[float] = None,
-    half_width_voxels: Optional[float] = None,
-    exterior_width_voxels: Optional[float] = None,
-    interior_width_voxels: Optional[float] = None,
+    half_width: Optional[Real] = None,
+    half_width_voxels: Optional[Real] = None,
+    exterior_width_voxels: Optional[Real] = None,
+    interior_width_voxels: Optional[Real] = None,
     method: Method = "exact",
     sign: Sign = "auto",
-    gap_voxels: float = 2,
+    gap_voxels: Real = 2,
     unite: bool = False,
     triangles: bool = False,
-    threads: int = 0,
+    threads: SupportsIndex = 0,
     device: str = "cpu",
-    delta: float = 0.5,
-    epsilon: float = 1,
-    neighbourhood: int = 2,
-    max_subdivision: int = 32,
+    delta: Real = 0.5,
+    epsilon: Real = 1,
+    neighbourhood: SupportsIndex = 2,
+    max_subdivision: SupportsIndex = 32,
     progress: Optional[Progress] = None,
 ) -> LevelSet: ...
 @overload
@@ -246,22 +250,22 @@ def build(
     mesh: MeshLike,
     *,
     resolution: None = None,
-    voxel_size: float,
-    half_width: Optional[float] = None,
-    half_width_voxels: Optional[float] = None,
-    exterior_width_voxels: Optional[float] = None,
-    interior_width_voxels: Optional[float] = None,
+    voxel_size: Optional[Real],
+    half_width: Optional[Real] = None,
+    half_width_voxels: Optional[Real] = None,
+    exterior_width_voxels: Optional[Real] = None,
+    interior_width_voxels: Optional[Real] = None,
     method: Method = "exact",
     sign: Sign = "auto",
-    gap_voxels: float = 2,
+    gap_voxels: Real = 2,
     unite: bool = False,
     triangles: bool = False,
-    threads: int = 0,
+    threads: SupportsIndex = 0,
     device: str = "cpu",
-    delta: float = 0.5,
-    epsilon: float = 1,
-    neighbourhood: int = 2,
-    max_subdivision: int = 32,
+    delta: Real = 0.5,
+    epsilon: Real = 1,
+    neighbourhood: SupportsIndex = 2,
+    max_subdivision: SupportsIndex = 32,
     progress: Optional[Progress] = None,
 ) -> LevelSet: ...
 def rebuild(
@@ -270,22 +274,22 @@ def rebuild(
     new_mesh: MeshLike,
     moved: Optional[ArrayLike] = None,
     *,
-    resolution: Optional[float] = None,
-    voxel_size: Optional[float] = None,
-    half_width: Optional[float] = None,
-    half_width_voxels: Optional[float] = None,
-    exterior_width_voxels: Optional[float] = None,
-    interior_width_voxels: Optional[float] = None,
+    resolution: Optional[Real] = None,
+    voxel_size: Optional[Real] = None,
+    half_width: Optional[Real] = None,
+    half_width_voxels: Optional[Real] = None,
+    exterior_width_voxels: Optional[Real] = None,
+    interior_width_voxels: Optional[Real] = None,
     method: Method = "exact",
     sign: Sign = "auto",
-    gap_voxels: float = 2,
+    gap_voxels: Real = 2,
     unite: bool = False,
     triangles: bool = False,
-    threads: int = 0,
-    delta: float = 0.5,
-    epsilon: float = 1,
-    neighbourhood: int = 2,
-    max_subdivision: int = 32,
+    threads: SupportsIndex = 0,
+    delta: Real = 0.5,
+    epsilon: Real = 1,
+    neighbourhood: SupportsIndex = 2,
+    max_subdivision: SupportsIndex = 32,
     progress: Optional[Progress] = None,
 ) -> LevelSet: ...
 def devices() -> List[Dict[str, Any]]: ...
@@ -294,8 +298,8 @@ def with_body(
     level_set: LevelSet,
     mesh: MeshLike,
     *,
-    point_spacing_voxels: float = 2,
-    margin: Optional[float] = None,
+    point_spacing_voxels: Real = 2,
+    margin: Optional[Real] = None,
     accuracy: Accuracy = "exact-near-features",
     keep_mesh: bool = True,
 ) -> LevelSet: ...
@@ -305,14 +309,14 @@ def collide(
     b: Union[Collider, Shape],
     pose_b: _PoseLike,
     *,
-    margin: float = 0,
+    margin: Real = 0,
     exact: bool = False,
-    scale_a: float = 1,
-    scale_b: float = 1,
+    scale_a: Real = 1,
+    scale_b: Real = 1,
     motion_a: Optional[ArrayLike] = None,
     motion_b: Optional[ArrayLike] = None,
-    min_normal_cosine: float = 0.3,
-    min_normal_cosine_apart: float = 0.9,
+    min_normal_cosine: Real = 0.3,
+    min_normal_cosine_apart: Real = 0.9,
     keep_oblique_edges: bool = False,
     reduced: bool = False,
     cache: Optional[ContactCache] = None,
@@ -323,15 +327,15 @@ def distance(
     b: Union[Collider, Shape],
     pose_b: _PoseLike,
     *,
-    scale_a: float = 1,
-    scale_b: float = 1,
-    max_distance: float = ...,
+    scale_a: Real = 1,
+    scale_b: Real = 1,
+    max_distance: Real = ...,
 ) -> BodyDistance: ...
 def distances(
-    colliders: Union[Collider, Sequence[Collider]],
-    poses: Union[Sequence[_PoseLike], NDArray[Any]],
+    colliders: Union[Collider, Iterable[Collider]],
+    poses: Union[Iterable[_PoseLike], NDArray[Any]],
     pairs: ArrayLike,
-    max_distance: float = ...,
+    max_distance: Real = ...,
 ) -> _Floats: ...
 def time_of_impact(
     a: Union[Collider, Shape],
@@ -341,9 +345,9 @@ def time_of_impact(
     pose_b: _PoseLike,
     motion_b: Optional[ArrayLike],
     *,
-    scale_a: float = 1,
-    scale_b: float = 1,
-    tolerance: float = 0,
+    scale_a: Real = 1,
+    scale_b: Real = 1,
+    tolerance: Real = 0,
     penetration: bool = False,
 ) -> Impact: ...
 def seed(
@@ -358,16 +362,16 @@ def particles(
     liquid: Union[LevelSet, Field],
     pose: _PoseLike = None,
     scale: ArrayLike = 1,
-    voxel_size: Optional[float] = None,
-    per_voxel: int = 8,
-    seed: int = 0,
+    voxel_size: Optional[Real] = None,
+    per_voxel: SupportsIndex = 8,
+    seed: SupportsIndex = 0,
 ) -> _Floats: ...
 def obstacle(
     solid: Union[LevelSet, MeshLike],
-    voxel_size: float,
+    voxel_size: Real,
     pose: _PoseLike = None,
     scale: ArrayLike = 1,
     velocity: ArrayLike = ...,
     angular_velocity: ArrayLike = ...,
-    half_width_voxels: float = 3,
+    half_width_voxels: Real = 3,
 ) -> Obstacle: ...

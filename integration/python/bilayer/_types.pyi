@@ -1,5 +1,5 @@
 from os import PathLike
-from typing import Any, Callable, Literal, Optional, Protocol, Tuple, Union
+from typing import Any, Callable, List, Literal, Optional, Protocol, SupportsFloat, Tuple, Union
 
 from numpy.typing import ArrayLike
 
@@ -54,8 +54,11 @@ MeshLike = Union[
     _PointsAndFaces,
     _PointsAndCells,
     Tuple[ArrayLike, ArrayLike],
+    List[Any],  # of the same two
 ]
 
+# Numbers of Python and numpy.
+Real = SupportsFloat
 Path = Union[str, bytes, PathLike[str]]
 Progress = Callable[[float], Optional[bool]]
 Method = Literal["exact", "double-layer", "pseudonormal", "prism"]

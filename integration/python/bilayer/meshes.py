@@ -98,7 +98,9 @@ def _polydata_faces(faces: Any) -> Any:
     while at < flat.size:
         count = int(flat[at])
         corners = flat[at + 1 : at + 1 + count]
-        if count not in (3, 4) or corners.size != count:
+        if count in (3, 4) and corners.size < count:
+            raise ValueError(f"expected {count} corners after .faces[{at}], got {corners.size}: .faces is cut short")
+        if count not in (3, 4):
             raise ValueError(f"expected .faces of 3 or 4 corners, got one of {count}: use triangulate()")
         (triangles if count == 3 else quads).append(corners)
         at += 1 + count
