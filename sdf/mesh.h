@@ -53,7 +53,7 @@ void validate(const Mesh& mesh);
 Mesh weld(Mesh mesh);
 
 /// Applies an affine map to a mesh. A map with a negative determinant also flips the triangles, so that normals still
-/// point outward. A nonzero origin is transformed too.
+/// point outward. A nonzero origin is transformed too. Throws std::invalid_argument for a vertex beyond floats.
 Mesh transformed(const Mesh& mesh, const glm::mat4& map);
 
 /// Returns a 64-bit hash of the vertices and triangles. It does not depend on the thread count.
