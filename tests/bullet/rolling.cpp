@@ -90,27 +90,31 @@ TEST_CASE("Balls roll on") {
     btStaticPlaneShape plane({0, 0, 1}, 0);
     btBoxShape box({10, 1, 0.1f});
     btCollisionShape& ground = onBox ? static_cast<btCollisionShape&>(box) : plane;
-    float kept = 0, highest = 0;
+    float kept = 0, highest = 0, meanLift = 0;
     constexpr int balls = 8;
     for (int i = 0; i < balls; ++i) {
         const btQuaternion turned(bullet::detail::toBullet(random.direction()), float(random(0, 3)));
         Roller roller(shape, ground, {0, 0, onBox ? -0.1f : 0.f}, speed, false, turned);
         std::optional<bullet::WorldExtensions> guard;
         if (isGuarded) guard.emplace(roller.world.dynamics);
+        float lift = 0;
         for (int step = 0; step < 60; ++step) {
             roller.world.dynamics.stepSimulation(1 / 60.f, 0);
-            highest = std::max(highest, float(roller.body->getWorldTransform().getOrigin().z()) - radius);
+            lift = std::max(lift, float(roller.body->getWorldTransform().getOrigin().z()) - radius);
         }
+        highest = std::max(highest, lift);
+        meanLift += lift / balls;
         const float left = roller.body->getLinearVelocity().x() / speed;
         CHECK(left < 1.02f);
         kept += left / balls;
     }
     // the loss at its facets, on each of which it lands. Those between points 1.4 voxels apart take about a sixth in
     // one second at 0.3 m/s. The ball must not be thrown up. At 3 m/s it rotates by half a radian per step and lifts by
-    // 1 to 2 mm, and by 3.1 mm for seed 4075818314; straight point displacements would lift it by 20 mm. At lower
+    // 1 to 2 mm, and one of a thousand balls by 3.1 mm; straight point displacements would lift all by 20 mm. At lower
     // speeds it does not hop
     CHECK(kept > 0.75f);
-    CHECK(highest < (speed < 2 ? 0.3f / 32 : 0.03f) * radius);
+    CHECK(meanLift < 0.02f * radius);
+    CHECK(highest < (speed < 2 ? 0.3f / 32 : 0.04f) * radius);
 }
 
 TEST_CASE("Hulls roll over fields") {

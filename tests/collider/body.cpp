@@ -249,7 +249,7 @@ TEST_CASE("a field alone is no body") {
 TEST_CASE("damaged bodies are refused by what is wrong") {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     REQUIRE_NOTHROW(Collider(changed({})));
-    requireRefusal(changed(setting("bilayer:body", std::int32_t(99))), "kind 99");
+    requireRefusal(changed(setting("bilayer:body", std::int32_t(99))), "format 99");
     requireRefusal(changed(setting("bilayer:margin", nan)), "bilayer:margin");
     requireRefusal(changed(setting("bilayer:margin", -1.f)), "bilayer:margin");
     requireRefusal(changed(setting("bilayer:volume", double(nan))), "bilayer:volume");
