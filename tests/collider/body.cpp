@@ -278,7 +278,7 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
 
     requireRefusal(changed({}, settingPoint("N", openvdb::Vec3s(0, 0, 2))), "needs a finite position and a normal");
     requireRefusal(changed({}, settingPoint("P", openvdb::Vec3s(nan, 0, 0))), "needs a finite position and a normal");
-    requireRefusal(changed({}, settingPoint("id", std::int32_t(-1))), "number -1");
+    requireRefusal(changed({}, settingPoint("id", std::int32_t(-1))), "one has -1");
     requireRefusal(changed({}, settingPoint("id", std::int32_t(1 << 30))), "number");
     const std::int32_t taken =
         openvdb::points::AttributeHandle<std::int32_t>(
