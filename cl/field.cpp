@@ -116,7 +116,7 @@ void DeviceField::Data::start(PointBatch& batch, std::span<const glm::vec3> poin
     }
     const std::size_t each = gpuMapping ? 1 : pointsPerProcessorItem, local = gpuMapping ? groupItems : 1;
     const std::size_t items = (points.size() + each - 1) / each, global = (items + local - 1) / local * local;
-    enqueueKernel(queue, program, "sampleField", cl::NDRange(global), cl::NDRange(local),
+    enqueueKernel(device.impl(), queue, program, "sampleField", cl::NDRange(global), cl::NDRange(local),
                   timing.event(Timing::Command::kernel), KernelFrame(layout.frame), layout.directory, layout.centres,
                   layout.values, batch.points, cl_uint(points.size()), cl_uint(each), batch.samples);
     cl::Event* const download = timing.event(Timing::Command::download);

@@ -213,7 +213,7 @@ std::vector<KernelFound> Sampler::run(const std::vector<KernelBody>& bodies, con
     do {
         answers_.reserve(capacity_ * sizeof(KernelFound), queue_, memory_);
         queue_.enqueueFillBuffer(count_.buffer(), none, 0, sizeof none);
-        enqueueKernel(queue_, program_, "samplePoints", cl::NDRange(global), cl::NDRange(local),
+        enqueueKernel(device_.impl(), queue_, program_, "samplePoints", cl::NDRange(global), cl::NDRange(local),
                       timing.event(Timing::Command::kernel), bodies_.buffer(), queries_.buffer(),
                       cl_uint(queries.size()), balls, cl_uint(each), directories_.buffer(), centres_.buffer(),
                       values_.buffer(), points_.buffer(), balls_.buffer(), cl_uint(capacity_), count_.buffer(),

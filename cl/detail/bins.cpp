@@ -68,7 +68,7 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
     queue.enqueueFillBuffer(cursors, cl_uint(0), 0, cursorBytes);
     queue.enqueueFillBuffer(extraParts, cl_uint(0), 0, cellBytes);
     const auto run = [&](const char* name, std::size_t global, std::size_t local, const auto&... arguments) {
-        enqueueKernel(queue, program, name, cl::NDRange(global), cl::NDRange(local),
+        enqueueKernel(device, queue, program, name, cl::NDRange(global), cl::NDRange(local),
                       timing.event(Timing::Command::kernel), arguments...);
     };
     const std::size_t local = gpuMapping ? groupItems : 1;

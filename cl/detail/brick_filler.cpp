@@ -26,6 +26,7 @@
 #include "cl/detail/mapped_buffer.h"
 #include "cl/detail/memory.h"
 #include "cl/detail/queue_guard.h"
+#include "cl/detail/staging.h"
 #include "cl/detail/timing.h"
 #include "sdf/base/progress.h"
 
@@ -87,11 +88,19 @@ class BrickFill {
     void keepOnDevice(BrickBatch& batch, std::size_t blocks);
     void passToHost(BrickBatch& batch, std::size_t blocks);
     void passToHost(const HostResults& results, std::size_t blocks);
+    // Blocks on their way to the host.
+    struct Download {
+        HostResults results{};
+        std::size_t blocks = 0;
+        cl::Event done{};
+    };
+    Download enqueueDownload(BrickBatch& batch, std::size_t first, std::size_t blocks);
+    void download(BrickBatch& batch, std::size_t blocks);
 
     template <class... Arguments>
     void enqueue(const cl::CommandQueue& queue, const char* name, std::size_t groups, const Arguments&... arguments) {
         const std::size_t items = mode_.gpuMapping ? groupItems : 1;
-        enqueueKernel(queue, program_, name, cl::NDRange(groups * items), cl::NDRange(items),
+        enqueueKernel(device_, queue, program_, name, cl::NDRange(groups * items), cl::NDRange(items),
                       timing_.event(Timing::Command::kernel), arguments...);
     }
 
@@ -109,10 +118,20 @@ class BrickFill {
     std::size_t scratchGroups_ = 0;
     cl_uint scratchCells_ = 0;
     std::optional<BatchPlan> plan_;
+    std::optional<Staging> staging_;  // if host and device share no memory
+    std::size_t nextHalf_ = 0;
     std::array<BrickBatch, batchesInFlight> batches_;
     std::vector<glm::ivec3> open_;  // blocks that the host fills
     QueueGuard guard_;              // of the device's queue
 };
+
+// Blocks that fit into a half of the staging memory, with the gaps that align their arrays.
+std::size_t blocksPerDownload(bool withTriangles) {
+    const ResultLayout one(1, withTriangles);
+    const std::size_t each =
+        2 * sizeof(glm::ivec3) + blockVoxels * (sizeof(float) + (withTriangles ? sizeof(cl_int) : 0));
+    return (Staging::halfBytes - one.end) / each;
+}
 
 // The maximum distance between a voxel and a triangle that affects it. The cube of the paper extends beyond its ball.
 float reachOf(const FillJob& job) {
@@ -263,9 +282,10 @@ void BrickFill::finish(BrickBatch& batch) {
     const std::size_t blocks = batch.counts.filledBlocks, open = batch.counts.openBlocks;
     if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.counts.conflicts;
     if (open > 0) {
-        const MappedBuffer<glm::ivec3> origins(batch.queue, batch.buffers.open, open, timing_);
-        batch.queue.finish();
-        open_.insert(open_.end(), origins.data(), origins.data() + open);
+        const std::size_t before = open_.size();
+        open_.resize(before + open);
+        batch.queue.enqueueReadBuffer(batch.buffers.open, CL_TRUE, 0, open * sizeof(glm::ivec3), &open_[before],
+                                      nullptr, timing_.event(Timing::Command::download));
     }
     job_.mesh.progress.poll();
     if (keep_)
@@ -297,12 +317,45 @@ void BrickFill::passToHost(BrickBatch& batch, std::size_t blocks) {
         batch.results.reset();
         return;
     }
-    const MappedBuffer<glm::ivec3> origins(batch.queue, b.origins, blocks, timing_);
-    const MappedBuffer<float> distances(batch.queue, b.distances, blocks * blockVoxels, timing_);
-    const MappedBuffer<std::int32_t> triangles(batch.queue, b.triangles, mode_.triangles ? blocks * blockVoxels : 0,
-                                               timing_);
-    batch.queue.finish();
-    passToHost(HostResults{origins.data(), distances.data(), triangles.data()}, blocks);
+    download(batch, blocks);
+}
+
+// Enqueues the download of some blocks to a half of the staging memory.
+BrickFill::Download BrickFill::enqueueDownload(BrickBatch& batch, std::size_t first, std::size_t blocks) {
+    const std::span<std::byte> to = staging_->half(nextHalf_++);
+    const ResultLayout layout(blocks, mode_.triangles);
+    Download download{{reinterpret_cast<const glm::ivec3*>(to.data() + layout.origins),
+                       reinterpret_cast<const float*>(to.data() + layout.distances),
+                       reinterpret_cast<const std::int32_t*>(to.data() + layout.triangles)},
+                      blocks,
+                      {}};
+    const auto read = [&](const cl::Buffer& from, std::uint64_t at, std::size_t each) {
+        batch.queue.enqueueReadBuffer(from, CL_FALSE, first * each, blocks * each, to.data() + at, nullptr,
+                                      &download.done);
+        timing_.keep(Timing::Command::download, download.done);
+    };
+    const BatchBuffers& b = batch.buffers;
+    read(b.origins, layout.origins, sizeof(glm::ivec3));
+    read(b.distances, layout.distances, blockVoxels * sizeof(float));
+    if (mode_.triangles) read(b.triangles, layout.triangles, blockVoxels * sizeof(cl_int));
+    batch.queue.flush();
+    return download;
+}
+
+// Passes blocks to the host as they arrive.
+void BrickFill::download(BrickBatch& batch, std::size_t blocks) {
+    if (!staging_) staging_.emplace(device_);
+    const auto next = [&](std::size_t first) {
+        const std::size_t count = std::min(blocks - first, blocksPerDownload(mode_.triangles));
+        return count > 0 ? enqueueDownload(batch, first, count) : Download{};
+    };
+    Download arriving = next(0);
+    for (std::size_t done = 0; done < blocks;) {
+        const Download arrived = std::exchange(arriving, next(done + arriving.blocks));
+        arrived.done.wait();
+        passToHost(arrived.results, arrived.blocks);
+        done += arrived.blocks;
+    }
 }
 
 void BrickFill::passToHost(const HostResults& results, std::size_t blocks) {

@@ -78,7 +78,7 @@ class DeviceFieldBuilder {
 
     template <class... Arguments>
     void enqueue(const char* name, const cl::NDRange& global, const cl::NDRange& local, const Arguments&... arguments) {
-        enqueueKernel(device_.queue, program_, name, global, local, timing_.event(Timing::Command::kernel),
+        enqueueKernel(device_, device_.queue, program_, name, global, local, timing_.event(Timing::Command::kernel),
                       arguments...);
     }
     // Enqueues a kernel with a work-group, or a single item, for each block.

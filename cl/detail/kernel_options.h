@@ -32,6 +32,7 @@ inline bool wantsGroups(const DeviceImpl& device, KernelMapping mapping) {
 inline std::string commonBuildOptions(const DeviceImpl& device, bool groups = false, bool triangles = false) {
     std::string options = "-cl-std=CL1.2";
     if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+    if (!device.info.gpu) options += " -D ON_PROCESSOR=1";
     if (groups) options += " -D GROUP_PER_BLOCK";
     if (triangles) options += " -D TRIANGLES=1";
     return options;

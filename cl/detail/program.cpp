@@ -149,4 +149,18 @@ cl::Program buildProgram(DeviceImpl& device, const std::string& source, const st
     return program;
 }
 
+cl::Kernel takeKernel(DeviceImpl& device, const cl::Program& program, const char* name) {
+    const std::lock_guard lock(device.mutex);
+    const auto found = device.kernels.find({program(), name});
+    if (found == device.kernels.end()) return {program, name};
+    cl::Kernel kernel = std::move(found->second);
+    device.kernels.erase(found);
+    return kernel;
+}
+
+void keepKernel(DeviceImpl& device, const cl::Program& program, const char* name, cl::Kernel kernel) {
+    const std::lock_guard lock(device.mutex);
+    device.kernels.emplace(std::pair(program(), name), std::move(kernel));
+}
+
 }  // namespace bilayer::detail

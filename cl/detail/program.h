@@ -13,10 +13,17 @@
 #include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <bilayer/cl/device.h>
 
 namespace bilayer::detail {
+
+/// A buffer in host memory, and its address while it is mapped.
+struct PinnedMemory {
+    cl::Buffer buffer;
+    void* address = nullptr;
+};
 
 struct DeviceImpl {
     DeviceInfo info;
@@ -27,6 +34,8 @@ struct DeviceImpl {
     std::map<std::pair<std::string, std::string>, cl::Program> programs;  // by source and build options
     std::multimap<std::uint64_t, cl::Buffer> spares;                      // by size; see memory.h
     std::uint64_t spareBytes = 0;
+    std::multimap<std::pair<cl_program, std::string>, cl::Kernel> kernels;  // that no thread uses; by program and name
+    std::vector<PinnedMemory> pinned;                                       // that no build uses; see staging.h
 };
 
 /// The name of an OpenCL error code, "CL_OUT_OF_RESOURCES"; "code -9999" for one that is not in the standard.
@@ -44,5 +53,11 @@ cl::Program buildProgram(DeviceImpl& device, const std::string& source, const st
 /// The file where buildProgram() stores the compiled program: in $XDG_CACHE_HOME/bilayer, else ~/.cache/bilayer; empty
 /// if neither variable is set. The name depends on driver, platform, source and options.
 std::filesystem::path cachedProgram(const DeviceInfo& device, const std::string& source, const std::string& options);
+
+/// Takes a kernel of a program that no thread uses, or creates one. The first launch of a new kernel takes a
+/// millisecond on some GPUs.
+cl::Kernel takeKernel(DeviceImpl& device, const cl::Program& program, const char* name);
+/// Keeps a kernel for takeKernel().
+void keepKernel(DeviceImpl& device, const cl::Program& program, const char* name, cl::Kernel kernel);
 
 }  // namespace bilayer::detail

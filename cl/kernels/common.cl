@@ -5,6 +5,7 @@
 //   default             a work-item does the work of a whole group: for processors, whose vector units process two rows
 //                       of voxels at once
 //   -D GROUP_PER_BLOCK  a work-group of 64 items works together, each on one row of a block: for GPUs
+//   -D ON_PROCESSOR=1   the device is a processor, whatever the mapping
 // The source is the same for both. The items of a group divide loops, `ITEM, ITEM + ITEMS, ...`, and synchronise at
 // barriers. A group of one item runs all of the loop and needs no barrier.
 #pragma OPENCL FP_CONTRACT OFF

@@ -117,6 +117,7 @@ uint sortMembers(const Groups* groups, uint first, global const Member* unsorted
         BARRIER;
         sum = 0;
         for (uint i = 0; i < ITEM; ++i) sum += sums[i];
+        BARRIER;  // the last item overwrites sums[0]
     }
     uint group = first + sum.y;
     for (uint cell = begin; cell < end; ++cell) {

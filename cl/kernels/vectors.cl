@@ -124,7 +124,7 @@ Exact longestEdges2(const Batch* batch) {
                max(squareExact(subExact(batch->c, batch->b)), squareExact(subExact(batch->a, batch->c))));
 }
 
-#if ITEMS == 1 && defined(__clang__)
+#if ITEMS == 1 && ON_PROCESSOR && defined(__clang__)
 
 #define prefetchLine(pointer) __builtin_prefetch((const void*)(size_t)(pointer))
 

@@ -278,7 +278,7 @@ TEST_CASE("OpenCL and TBB agree where faces of opposite sides lie on each other"
 
 TEST_CASE("a little device memory means many batches and the same field") {
     const Mesh mesh = shapes::sphere(1.f, 3);
-    BuildOptions options = optionsFor(mesh, 150, GENERATE(Method::exact, Method::doubleLayer));
+    BuildOptions options = optionsFor(mesh, 250, GENERATE(Method::exact, Method::doubleLayer));
     options.triangles = GENERATE(false, true);
     const std::uint64_t memory = GENERATE(2, 3);
     CAPTURE(memory);
@@ -310,6 +310,24 @@ TEST_CASE("a device keeps buffers for the next build, which may be of another me
     CHECK(small.times().kernels == 0);  // not measured without `profile`
     CHECK(device.impl().spareBytes <= memory << 20);
     checkSame(expected, build(ball, ofBall, openclFiller(device)));
+}
+
+TEST_CASE("results come from a device with memory of its own") {
+    const Device device = openDevice();
+    device.impl().info.unifiedMemory = false;
+    const KernelMapping mapping = GENERATE(KernelMapping::blockPerItem, KernelMapping::groupPerBlock);
+    const OpenclFiller filler = openclFiller(device, {.mapping = mapping, .profile = true});
+    const Mesh mesh = shapes::torus(1.f, 0.4f);
+    for (const bool triangles : {false, true}) {
+        BuildOptions options = optionsFor(mesh, 150, GENERATE(Method::exact, Method::doubleLayer));
+        options.triangles = triangles;
+        const LevelSet expected = build(mesh, options), found = build(mesh, options, filler);
+        CAPTURE(int(mapping), triangles, int(options.method), found.leaves());
+        checkSame(expected, found);
+        if (triangles) checkSameTriangles(mesh, options, expected, found);
+        CHECK(device.impl().pinned.size() == 1);
+    }
+    CHECK(filler.times().download > 0);
 }
 
 TEST_CASE("a device without double precision is refused by name") {
