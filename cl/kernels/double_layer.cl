@@ -16,8 +16,11 @@
 void storeSlice(Lanes values, int slice, int3 inBlock, BLOCK_MEMORY float* block) {
 #if ITEMS > 1
     (void)(slice);
-    (void)(inBlock);
-    vstore8(values, ITEM, block);
+    const int item = (int)(ITEM % ITEMS_PER_CUBE);
+    BLOCK_MEMORY float* corner =
+        block + ((inBlock.x + item / 2) * BLOCK_SIDE + inBlock.y + item % 2 * 2) * BLOCK_SIDE + inBlock.z;
+    vstore4(values.lo, 0, corner);
+    vstore4(values.hi, 0, corner + BLOCK_SIDE);
 #else
     BLOCK_MEMORY float* corner = block + ((inBlock.x + slice) * BLOCK_SIDE + inBlock.y) * BLOCK_SIDE + inBlock.z;
     *(BLOCK_MEMORY float4*)(corner) = values.s0123;
@@ -62,13 +65,15 @@ enum { FILLED_BLOCKS };
 
 // Working memory of a group.
 typedef struct {
-    Points inner, outer;
 #if ITEMS > 1
+    SelectedSamples samples;
     float values[BLOCK_VOXELS] __attribute__((aligned(64)));
 #if TRIANGLES
     float owners[BLOCK_VOXELS] __attribute__((aligned(64)));
 #endif
     uint slot, anyKnown;
+#else
+    Points inner, outer;
 #endif
 } Scratch;
 
@@ -104,16 +109,30 @@ int3 firstVoxel(const Grid* grid, uint block) {
     return BLOCK_SIDE * (int3)(n >> 2 * bits, n >> bits & last, n & last);
 }
 
-// Fills a block of a brick. Returns whether this item has any known distance.
-INLINED uint fillBlock(const Input* input, int3 inBrick, SHARED Scratch* work, SHARED uint* innerSelected,
-                       SHARED uint* outerSelected, BLOCK_MEMORY float* values, BLOCK_MEMORY float* owners) {
-    const Layer inner = {&work->inner, innerSelected}, outer = {&work->outer, outerSelected};
+// The first voxel of a cube in its block.
+int3 cubeInBlock(int cube) {
+    return CUBE_SIDE * (int3)(cube / 4, cube / 2 % 2, cube % 2);
+}
+
+// Fills a block of a brick, or on a GPU this item's part of it. `selected` has counts of selected points: one of each
+// layer, on a GPU one of samples. Returns whether any of the distances is known.
+INLINED uint fillBlock(const Input* input, int3 inBrick, SHARED Scratch* work, SHARED uint* selected,
+                       BLOCK_MEMORY float* values, BLOCK_MEMORY float* owners) {
     uint known = 0;
     for (int cube = 0; cube < CUBES; ++cube) {
-        const int3 inBlock = CUBES > 1 ? SLICES * (int3)(cube / 4, cube / 2 % 2, cube % 2) : (int3)(0);
+#if ITEMS > 1
+        const int3 inBlock = cubeInBlock((int)(ITEM / ITEMS_PER_CUBE)), selection = inBrick;
         const Voxels v = ownVoxels(inBrick.x + inBlock.x);
-        Cube around = {.input = input, .voxels = &v, .inner = inner, .outer = outer};
-        const bool any = fillCube(&around, inBrick + inBlock);
+        Cube around = {.input = input, .voxels = &v, .samples = &work->samples, .selected = selected};
+#else
+        const int3 inBlock = cubeInBlock(cube), selection = inBrick + inBlock;
+        const Voxels v = ownVoxels(inBrick.x + inBlock.x);
+        Cube around = {.input = input,
+                       .voxels = &v,
+                       .inner = {&work->inner, selected},
+                       .outer = {&work->outer, selected + 1}};
+#endif
+        const bool any = fillCube(&around, inBrick + inBlock, selection);
         UNROLLED for (int i = 0; i < SLICES; ++i) {
             Lanes distances = INFINITY;
             IntLanes nearest = -1;
@@ -158,7 +177,7 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
                              global const ulong* orders, global int* origins, global float* distances,
                              global int* nearestTriangles, global uint* counters) {
     SHARED Scratch work;
-    SHARED uint innerSelected, outerSelected;
+    SHARED uint selected[1];
     const uint perBrick = blocksPerBrick(&grid), brick = (uint)(get_group_id(0)) / perBrick;
     const Bricks bricks = {0, 0, grid, cellOfBrick, 0, partOffsets, 0, firstBrick, layers};
     const Input input = {sorted + firstSample(partOffsets, firstBrick, brick),
@@ -175,7 +194,7 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
     (void)(nearestTriangles);
     local float* const owners = 0;
 #endif
-    const uint known = fillBlock(&input, inBrick, &work, &innerSelected, &outerSelected, work.values, owners);
+    const uint known = fillBlock(&input, inBrick, &work, selected, work.values, owners);
     BARRIER;
     if (ITEM == 0) work.anyKnown = 0;
     BARRIER;
@@ -208,12 +227,12 @@ INLINED void fillBlocksFrom(const Bricks* bricks, uint brick, uint first, const 
     ulong nonEmpty = 0;
     for (uint i = 0; i < BLOCKS_AT_ONCE; ++i) nonEmpty |= (ulong)(hasSamples(input, firstVoxel(grid, first + i))) << i;
     const uint count = (uint)(popcount(nonEmpty));
-    uint slot = atomic_add(filled->counters + FILLED_BLOCKS, count), innerSelected, outerSelected;
+    uint slot = atomic_add(filled->counters + FILLED_BLOCKS, count), selected[2];
     const uint end = slot + count;
     for (; nonEmpty != 0; nonEmpty &= nonEmpty - 1) {
         const int3 inBrick = firstVoxel(grid, first + 63 - (uint)(clz(nonEmpty & -nonEmpty)));
         const size_t offset = (size_t)(slot)*BLOCK_VOXELS;
-        if (!fillBlock(input, inBrick, work, &innerSelected, &outerSelected, filled->distances + offset,
+        if (!fillBlock(input, inBrick, work, selected, filled->distances + offset,
                        (global float*)(filled->triangles) + offset))
             continue;
         storeOrigin(bricks, brick, inBrick, slot, filled->origins);
