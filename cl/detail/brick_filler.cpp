@@ -28,6 +28,7 @@
 #include "cl/detail/queue_guard.h"
 #include "cl/detail/staging.h"
 #include "cl/detail/timing.h"
+#include "sdf/base/bit_orders.h"
 #include "sdf/base/progress.h"
 
 namespace bilayer::detail {
@@ -147,18 +148,6 @@ std::uint64_t sampleCells(const BrickGrid& grid) {
     return side * side * side + 2;
 }
 
-// For each byte value, the positions of its set bits in ascending order, one byte each: `orders` of double_layer.cl.
-const std::array<cl_ulong, 256>& bitOrders() {
-    static const std::array<cl_ulong, 256> orders = [] {
-        std::array<cl_ulong, 256> made{};
-        for (unsigned byte = 0; byte < made.size(); ++byte)
-            for (unsigned bit = 0, at = 0; bit < 8; ++bit)
-                if (byte >> bit & 1) made[byte] |= cl_ulong(bit) << 8 * at++;
-        return made;
-    }();
-    return orders;
-}
-
 BatchMode modeOf(const DeviceImpl& device, const OpenclOptions& options, const FillJob& job) {
     const bool gpuMapping = wantsGroups(device, options.mapping);
     return {gpuMapping, job.options.method == Method::doubleLayer && !gpuMapping, job.mesh.triangles};
@@ -178,8 +167,7 @@ BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const Fil
       guard_(device.queue) {
     const float reach = reachOf(job);
     if (doubleLayer_)
-        orders_ =
-            memory_.upload(bitOrders().data(), sizeof bitOrders(), purpose, timing_.event(Timing::Command::upload));
+        orders_ = memory_.upload(bitOrders.data(), sizeof bitOrders, purpose, timing_.event(Timing::Command::upload));
     bins_.emplace(device, program_, memory_, job, reach, doubleLayer_ ? reach : reach + 1, mode_.gpuMapping, timing_);
     job.mesh.progress.begin(bins_->bricks());
     for (BrickBatch& batch : batches_) {

@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "sdf/base/compress.h"
 #include "sdf/bvh/leaf_measure.h"
 #include "sdf/bvh/node_list.h"
 
@@ -84,11 +85,16 @@ struct Narrowing {
     void keep(const BoxArrays& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask mask) {
         const Tag tag;
         to.makeRoom(treeWidth);
+        const Compressor<Tag> kept(tag, mask);
+        const auto compress = [&](auto d, auto values, auto* column) {
+            hn::StoreU(kept(d, values), d, column + to.count);
+        };
         for (int k = 0; k < 3; ++k) {
-            hn::CompressStore(hn::LoadU(tag, boxes.lower[k] + i), mask, tag, to.lower[k].data() + to.count);
-            hn::CompressStore(hn::LoadU(tag, boxes.upper[k] + i), mask, tag, to.upper[k].data() + to.count);
+            compress(tag, hn::LoadU(tag, boxes.lower[k] + i), to.lower[k].data());
+            compress(tag, hn::LoadU(tag, boxes.upper[k] + i), to.upper[k].data());
         }
-        to.count += hn::CompressStore(nodes, hn::RebindMask(IndexTag(), mask), IndexTag(), to.nodes.data() + to.count);
+        compress(IndexTag(), nodes, to.nodes.data());
+        to.count += kept.count();
     }
 };
 

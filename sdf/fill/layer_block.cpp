@@ -16,6 +16,8 @@
 #include <cstring>
 #include <limits>
 
+#include "sdf/base/compress.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -93,8 +95,9 @@ struct LayerPoints {
         hn::StoreU(py, tag, y + first);
         hn::StoreU(pz, tag, z + first);
         hn::StoreU(hn::Mul(square(px, py, pz), hn::Set(tag, 0.5f)), tag, halfSquare + first);
-        hn::StoreU(hn::Compress(numbers, hn::RebindMask(indexTag, near)), indexTag, picked + count);
-        count += hn::CountTrue(tag, near);
+        const Compressor<Tag> compress(tag, near);
+        hn::StoreU(compress(indexTag, numbers), indexTag, picked + count);
+        count += compress.count();
     }
 
     float *x, *y, *z, *halfSquare;  // of all points, in the order of the brick's samples

@@ -13,6 +13,7 @@
 
 #include <cstddef>
 
+#include "sdf/base/compress.h"
 #include "sdf/base/vector_lanes.h"
 #include "sdf/fill/layer_samples.h"
 
@@ -43,8 +44,9 @@ class SampleWriter {
         const auto cell =
             hn::Add(hn::Mul(hn::Add(hn::Mul(cellAt(place.x), size), cellAt(place.y)), size), cellAt(place.z));
         to_.reserve(to_.count + hn::Lanes(tag));
+        const Compressor<D> kept(tag, near);
         const auto compress = [&](auto d, auto values, auto* column) {
-            hn::StoreU(hn::Compress(values, hn::RebindMask(d, near)), d, column + to_.count);
+            hn::StoreU(kept(d, values), d, column + to_.count);
         };
         compress(tag, place.x, to_.columns.place[0].data());
         compress(tag, place.y, to_.columns.place[1].data());
@@ -54,7 +56,7 @@ class SampleWriter {
         compress(tag, offset.z, to_.columns.offset[2].data());
         compress(intTag, triangle, to_.columns.triangle.data());
         compress(intTag, cell, to_.cell.data());
-        to_.count += hn::CountTrue(tag, near);
+        to_.count += kept.count();
     }
 
   private:
