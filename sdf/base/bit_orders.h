@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The positions of the set bits of each byte.
-// Tested by tests/sdf/compress.cpp.
+// Tested by tests/sdf/compress.cpp through Compressor.
 #pragma once
 
 #include <array>
