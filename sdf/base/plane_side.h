@@ -23,7 +23,9 @@ inline int planeSide(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3&
     const double volume = glm::dot(glm::cross(u, v), w);
     const glm::dvec3 products(std::abs(u.y * v.z) + std::abs(u.z * v.y), std::abs(u.z * v.x) + std::abs(u.x * v.z),
                               std::abs(u.x * v.y) + std::abs(u.y * v.x));
-    if (std::abs(volume) > rounding * glm::dot(products, glm::abs(w))) return volume > 0 ? 1 : -1;
+    const double bound = glm::dot(products, glm::abs(w));
+    if (bound == 0) return 0;  // every product is zero, as in a plane across an axis
+    if (std::abs(volume) > rounding * bound) return volume > 0 ? 1 : -1;
     return exactPlaneSide(a, b, c, d);
 }
 

@@ -106,6 +106,7 @@ class ExactBrickFiller {
 
     void cut(std::size_t brick) {
         s_.pieces.clear();
+        s_.pieces.reserve(bins_.trianglesOf(brick).size());
         const TriangleLimits limits = limitsOfWanted();
         PieceCutter cutter(maxPieceEdge, s_.pieces);
         detail::forEachTriangle(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit_,

@@ -236,6 +236,7 @@ Mesh readObj(const std::filesystem::path& path, ReadReport& report) {
     const TextSource source(path, file.bytes());
     std::vector<ObjPart> parts = cut(source);
     inOrder(parts.size(), [&](std::size_t i) { PartReader(source, parts[i]).run(); });
+    file.release();
     return assembled(file, joined(source, parts), path, report);
 }
 

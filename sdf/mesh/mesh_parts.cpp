@@ -5,10 +5,10 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
-#include <iterator>
 #include <utility>
 
 #include "sdf/base/progress.h"
@@ -53,17 +53,6 @@ bool isConnected(std::size_t triangles, std::vector<std::pair<std::uint64_t, uns
     return true;
 }
 
-// Returns the items that occur an odd number of times, in order.
-std::vector<unsigned> oddOnes(std::vector<unsigned> items) {
-    std::vector<unsigned> odd;
-    std::sort(items.begin(), items.end());
-    for (std::size_t i = 0, j; i < items.size(); i = j) {
-        for (j = i; j < items.size() && items[j] == items[i];) ++j;
-        if ((j - i) % 2) odd.push_back(items[i]);
-    }
-    return odd;
-}
-
 }  // namespace
 
 MeshParts::MeshParts(const Mesh& mesh, std::span<const unsigned> partOf, std::size_t parts, Progress* progress)
@@ -103,6 +92,7 @@ void MeshParts::findSeparating(Progress* progress) {
         std::vector<std::pair<std::uint64_t, unsigned>>
             corners;  // hash of the vertex, index of the triangle in its part
         const std::span triangles = members(unsigned(part));
+        corners.reserve(3 * triangles.size());
         for (unsigned i = 0; i < triangles.size(); ++i) {
             const glm::uvec3& t = mesh_.triangles[triangles[i]];
             for (int k = 0; k < 3; ++k) {
@@ -149,14 +139,22 @@ bool MeshParts::contains(unsigned outer, unsigned inner) const {
 }
 
 std::vector<unsigned> MeshParts::containersOf(unsigned inner, const TriangleTree& tree) const {
-    std::vector<unsigned> containers = oddOnes(crossedBy(inner, 0, tree));
-    for (std::size_t vote = 1; vote < votes; ++vote) {
-        const std::vector<unsigned> odd = oddOnes(crossedBy(inner, vote, tree));
-        std::vector<unsigned> both;
-        std::set_intersection(containers.begin(), containers.end(), odd.begin(), odd.end(), std::back_inserter(both));
-        containers.swap(both);
-    }
-    std::erase_if(containers, [&](unsigned outer) { return outer == inner || !holds(box(outer), box(inner)); });
+    std::array<std::vector<unsigned>, votes> crossed;
+    for (std::size_t vote = 0; vote < votes; ++vote) crossed[vote] = crossedBy(inner, vote, tree);
+    std::vector<unsigned> containers;
+    containers.reserve(crossed[0].size());
+    // by part: the votes whose lines cross it an odd number of times. Zero between calls
+    thread_local std::vector<std::uint8_t> odd;
+    if (odd.size() < count()) odd.resize(count());
+    for (std::size_t vote = 0; vote < votes; ++vote)
+        for (const unsigned outer : crossed[vote]) odd[outer] ^= std::uint8_t(1u << vote);
+    for (const std::vector<unsigned>& parts : crossed)
+        for (const unsigned outer : parts) {
+            const bool within = odd[outer] == (1u << votes) - 1 && outer != inner && holds(box(outer), box(inner));
+            if (within) containers.push_back(outer);
+            odd[outer] = 0;
+        }
+    std::sort(containers.begin(), containers.end());
     return containers;
 }
 
