@@ -15,7 +15,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/nanovdb.h>
 #include <bilayer/sdf/surface.h>
-#include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/body.h"
 #include "sdf/base/openvdb.h"
 #include "tools/commands.h"
 #include "tools/output.h"
@@ -47,7 +47,7 @@ bool parsePoint(const std::string& line, glm::dvec3& point) {
 }
 
 void runQuery(const FieldArguments& a) {
-    const LevelSet levelSet = readVdb(a.field);
+    const LevelSet levelSet = detail::readStored(a.field).levelSet;
     const Field field(levelSet);
     const glm::dvec3 origin = levelSet.origin();
     std::ios::sync_with_stdio(false);
@@ -68,7 +68,7 @@ void runQuery(const FieldArguments& a) {
 
 void runSurface(const FieldArguments& a) {
     requireOther(a.output, a.field);
-    const LevelSet field = readVdb(a.field);
+    const LevelSet field = detail::readStored(a.field).levelSet;
     requireWritable(a.output);
     const Mesh mesh = surface(field, a.options);
     if (mesh.triangles.empty())
@@ -82,7 +82,7 @@ void runSurface(const FieldArguments& a) {
 
 void runExport(const FieldArguments& a) {
     requireOther(a.output, a.field);
-    const LevelSet field = readVdb(a.field);
+    const LevelSet field = detail::readStored(a.field).levelSet;
     requireWritable(a.output);
     writeNanoVdb(a.output, field);
     const std::uint64_t size = std::filesystem::file_size(a.output);

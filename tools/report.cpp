@@ -14,7 +14,6 @@
 #include <bilayer/integration/bullet/settings.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
-#include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/body.h"
 #include "sdf/base/openvdb.h"
 #include "tools/commands.h"
@@ -163,16 +162,6 @@ Json gridList(const std::filesystem::path& path) {
     return list;
 }
 
-// Returns nothing for a field without a body.
-std::optional<Body> storedBody(const ReportArguments& a, const LevelSet& field) {
-    if (!hasBody(field)) return std::nullopt;
-    try {
-        return bodyOf(field);
-    } catch (const std::invalid_argument& error) {
-        throw std::runtime_error(fmt::format("{}: {}", a.input.string(), error.what()));
-    }
-}
-
 void printInfo(const ReportArguments& a, const LevelSet& field, const Json& grids, const std::optional<Body>& body,
                const std::optional<MassProperties>& mass) {
     Table table(a.input.string());
@@ -197,9 +186,8 @@ Json inVoxels(float width, const LevelSet& field) {
 }
 
 void runInfo(const ReportArguments& a) {
-    const LevelSet field = readVdb(a.input);
+    const auto [field, body] = readStored(a.input);
     const Json grids = gridList(a.input);
-    const std::optional<Body> body = storedBody(a, field);
     const std::optional<MassProperties> mass = body ? body->mass : massOf(field);
     if (!a.json) return printInfo(a, field, grids, body, mass);
     Json json{{"grids", grids},

@@ -17,7 +17,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
-#include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/body.h"
 #include "integration/fluid/detail/liquid_copy.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/leaf/build_options.h"
@@ -88,7 +88,7 @@ glm::dvec3 remainder(const SeedArguments& a, const fluid::Placement& placement) 
 }
 
 Input read(const std::filesystem::path& path, const glm::dvec3& moved, ReadReport& file) {
-    if (isVdb(path)) return readVdb(path);
+    if (isVdb(path)) return detail::readStored(path).levelSet;
     auto [mesh, contents] = readMeshFile(path);
     file = std::move(contents);
     if (mesh.origin != glm::dvec3(0)) mesh.origin += moved;
@@ -103,7 +103,7 @@ glm::dvec3 wholeVoxels(const glm::dvec3& place, double voxelSize) {
 // Returns the initial liquid relative to its origin, which is in its metadata if it is not zero.
 openvdb::FloatGrid::Ptr startingLiquid(const SeedArguments& a, const Input& first, const fluid::Placement& placement) {
     openvdb::initialize();
-    if (!a.into.empty()) return fluid::detail::liquidCopy(readVdb(a.into));
+    if (!a.into.empty()) return fluid::detail::liquidCopy(detail::readStored(a.into).levelSet);
     float voxelSize = a.voxelSize;
     if (a.resolution > 0)
         voxelSize =

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/stored_body.h"
 #include "collider/contact/stored_mesh.h"
 #include "collider/contact/stored_points.h"
@@ -268,6 +269,17 @@ Body bodyOf(const LevelSet& levelSet) {
     }
     check(body, *levelSet.grids().distance);
     return body;
+}
+
+StoredField readStored(const std::filesystem::path& path) {
+    StoredField stored{readVdb(path), std::nullopt};
+    if (!hasBody(stored.levelSet)) return stored;
+    try {
+        stored.body = bodyOf(stored.levelSet);
+    } catch (const std::invalid_argument& error) {
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
+    }
+    return stored;
 }
 
 }  // namespace bilayer::detail

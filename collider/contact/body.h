@@ -3,6 +3,7 @@
 // grids in their .vdb file. The mesh file is then not needed again.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -41,5 +42,15 @@ LevelSet withBody(const LevelSet& levelSet, const Body& body);
 /// Returns the body stored in a level set. Throws std::invalid_argument if there is none, if its format is newer, or if
 /// it cannot belong to this field; the message says what is missing or damaged.
 Body bodyOf(const LevelSet& levelSet);
+
+/// A level set and the body stored with it, if any.
+struct StoredField {
+    LevelSet levelSet;
+    std::optional<Body> body;
+};
+
+/// Reads a file as readVdb() does, and checks the body stored in it, also where only the field is of interest. Throws
+/// std::runtime_error that names the file if readVdb() or bodyOf() would refuse it.
+StoredField readStored(const std::filesystem::path& path);
 
 }  // namespace bilayer::detail

@@ -17,6 +17,7 @@
 #include <bilayer/sdf/surface.h>
 #include <bilayer/sdf/vdb_io.h>
 
+#include "collider/contact/body.h"
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
@@ -165,7 +166,7 @@ void save(const LevelSet& levelSet, const Path& path, bool halfFloat) {
 LevelSet load(const Path& path) {
     requireExisting(path);
     const WithoutGil release;
-    return readVdb(path.text);
+    return detail::readStored(path.text).levelSet;
 }
 
 SharedMesh extract(const LevelSet& levelSet, float isovalue, float adaptivity) {

@@ -15,7 +15,7 @@
 #include "demos/shared/shapes.h"
 #include "liquids.h"
 #include "sdf/base/openvdb.h"
-#include "tests/support/cells.h"
+#include "tests/support/profiles.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
@@ -23,54 +23,16 @@ using namespace bilayer;
 using namespace bilayer::test;
 using openvdb::FloatGrid;
 
-namespace {
-
-// Two rows of cells that letters fill or leave out: shapes with right angles, some of them several cells high.
-struct Profile {
-    const char* name;
-    std::vector<std::string> rows;
-};
-
-const std::vector<Profile> profiles{{"box", {"#"}},
-                                    {"L prism", {"#.", "##"}},
-                                    {"stairs", {"#...", "##..", "###.", "####"}},
-                                    {"cross", {".#.", "###", ".#."}},
-                                    {"plate", {"#"}},
-                                    {"rod", {"#"}}};
-
-// A profile with steps of random lengths [m]; plates are thin along one axis, rods along two.
-Mesh prism(const Profile& profile, std::mt19937& random, double voxel) {
-    std::uniform_real_distribution<double> any(2, 12), thin(1.5, 3);
-    const bool whole = random() % 2;  // whole numbers of voxels, as in CAD models
-    const std::string name = profile.name;
-    const auto step = [&](int axis) {
-        const bool isThin = (name == "plate" && axis == 0) || (name == "rod" && axis < 2);
-        const double voxels = isThin ? thin(random) : any(random);
-        return (whole ? std::round(voxels) : voxels) * voxel;
-    };
-    test::Planes planes;
-    const std::array<std::size_t, 3> counts{profile.rows[0].size(), profile.rows.size(), 1};
-    for (int axis = 0; axis < 3; ++axis) {
-        double at = 0;
-        for (std::size_t i = 0; i <= counts[std::size_t(axis)]; ++i, at += step(axis))
-            planes[std::size_t(axis)].push_back(float(at));
-    }
-    return test::solidOf(
-        planes, [&](const glm::ivec3& cell) { return profile.rows[std::size_t(cell.y)][std::size_t(cell.x)] == '#'; });
-}
-
-}  // namespace
-
 TEST_CASE("shapes of right angles are level sets at any size and place") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
-    for (const Profile& profile : profiles) {
+    for (const Profile& profile : profiles()) {
         std::mt19937 random(seed);
         std::uniform_real_distribution<double> size(0.01, 0.1), place(-1, 1);
         for (int i = 0; i < 200; ++i) {
             const double voxel = i % 3 ? size(random) : std::array{0.02, 0.025, 0.05}[random() % 3];
             CAPTURE(profile.name, i, voxel);
-            const Mesh mesh = prism(profile, random, voxel);
+            const Mesh mesh = prismOf(profile, random, voxel);
             const auto liquid = openvdb::createLevelSet<FloatGrid>(voxel, 3);
             glm::vec3 shift(0);
             if (i % 2) shift = glm::vec3(place(random), place(random), place(random)) * float(voxel);

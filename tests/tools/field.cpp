@@ -4,6 +4,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
 #include <sstream>
 
 #include <bilayer/sdf/grids.h>
@@ -54,6 +56,40 @@ TEST_CASE("query answers line by line") {
     CHECK(band[1] == 1);
     CHECK((d[2] < 0 && band[2] == 0));
     CHECK((d[3] > 0 && band[3] == 0 && x[3] == 0));
+}
+
+TEST_CASE("Every command refuses a file whose body has an entry out of range, by its name") {
+    const std::string good = scratch("body.vdb").string(), bad = scratch("bad_body.vdb").string(),
+                      output = rejectedOutput();
+    buildSphere(good, {"--voxel-size", "0.05", "--body"});
+    const LevelSet field = readVdb(good);
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+    const auto number = [](auto value) { return std::make_shared<openvdb::TypedMetadata<decltype(value)>>(value); };
+    const std::pair<const char*, openvdb::Metadata::Ptr> entries[] = {
+        {"bilayer:margin", number(-1.f)},
+        {"bilayer:margin", number(nan)},
+        {"bilayer:margin", number(1e38f)},
+        {"bilayer:volume", number(1e38)},
+        {"bilayer:bounds_lower", number(nan * openvdb::Vec3s(1, 1, 1))},
+        {"bilayer:principal_axes", number(openvdb::Vec4s(2, 0, 0, 0))}};
+    for (const auto& [name, value] : entries) {
+        const auto distance = inWorld(field.grids().distance, field);
+        distance->insertMeta(name, *value);
+        writeGrids(bad, {distance, field.grids().points});
+        const Words commands[] = {{"info", bad},
+                                  {"query", bad},
+                                  {"surface", bad, "-o", output + ".ply"},
+                                  {"export", bad, "-o", output + ".nvdb"},
+                                  {"seed", bad, "--voxel-size", "0.05", "-o", output + ".vdb"}};
+        for (const Words& command : commands) {
+            const Result r = run(command, {.input = "0.55 0 0"});
+            CAPTURE(command.front(), name, value->str(), r.out, r.err);
+            CHECK(r.status == 1);
+            CHECK(r.out.empty());
+            CHECK(r.errorLines() == 1);
+            CHECK_THAT(r.err, Catch::Contains(bad) && Catch::Contains(name));
+        }
+    }
 }
 
 TEST_CASE("surface returns the sphere") {
