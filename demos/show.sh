@@ -24,6 +24,7 @@ status=0
 "$program" "$@" || status=$?
 ((status == 0 || status == 3)) || exit "$status"
 
+echo "taking the picture $out/$name.png with Chromium: seconds on an idle machine, minutes on a busy one" >&2
 rm -f "$out/$name.png"
 page=$(realpath "$out/$name.html")
 chromium --headless --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run \

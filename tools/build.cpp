@@ -14,6 +14,7 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/integration/fluid/extend.h>
 #include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "sdf/base/method_names.h"
@@ -255,6 +256,7 @@ Json toJson(const BuildArguments& a, const BuildOutcome& o, const Mesh& mesh, co
               {"activeVoxels", field.activeVoxels()},
               {"leaves", field.leaves()},
               {"memoryBytes", field.memoryBytes()},
+              {"hasInside", o.hasInside},
               {"backend", a.backend},
               {"device", o.device},
               {"seconds",
@@ -285,6 +287,13 @@ CLI::Option_group* addBuildOptions(CLI::App& command, BuildArguments& a) {
 
 namespace {
 
+// Ends at the first voxel that is inside.
+bool hasInside(const LevelSet& field) {
+    for (auto value = field.grids().distance->tree().cbeginValueAll(); value; ++value)
+        if (*value < 0) return true;
+    return false;
+}
+
 void printTable(const BuildArguments& a, const BuildOutcome& o, const Mesh& mesh, const LevelSet& field) {
     Table input(a.mesh.string());
     addRows(input, o.file);
@@ -295,6 +304,8 @@ void printTable(const BuildArguments& a, const BuildOutcome& o, const Mesh& mesh
     input.print();
     Table table(a.output.string());
     addRows(table, field, a.stored);
+    if (!o.hasInside)
+        table.row("note", "the field has no inside: every voxel is outside; try another --sign, or close the mesh");
     if (a.body) addRows(table, bodyOf(field));
     table.row("filled by", fmt::format("{} on {}", a.backend, o.device));
     table.row("build", fmt::format("{:.3f} s: tiles {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.tiles,
@@ -319,6 +330,7 @@ void run(BuildArguments a) {
     requireWritable(a.output);
     setSizes(a, mesh);
     const LevelSet field = buildField(a, mesh, outcome);
+    outcome.hasInside = hasInside(field);
     const Stopwatch writing;
     writeVdb(a.output, field, a.stored);
     outcome.write = writing.seconds();

@@ -50,6 +50,7 @@ struct BuildOutcome {
     std::optional<MeshReport> report;
     std::string device;
     BuildTimes times;
+    bool hasInside = true;  // whether any voxel is inside
     double read = 0, inspect = 0, build = 0, extend = 0, body = 0, write = 0;
 };
 

@@ -56,7 +56,9 @@ void fillWithAutomaticSign(FieldFiller& filler) {
         const Mesh& mesh = repaired ? *repaired : filler.mesh();
         const bool borrows = choice.sign == Sign::normals && method == Method::pseudonormal;
         const Sign sign = filler.fill(mesh, choice.sign, choice.reason, borrows ? Method::exact : method);
+        part.lap();
         auto other = sign == Sign::normals ? otherChoice(filler.signs(), mesh, progress) : std::nullopt;
+        filler.times().tiles += part.lap();
         if (!other) {
             if (borrows && sign == Sign::normals) filler.fillWithSidesOfLast(mesh, choice.reason);
             return;

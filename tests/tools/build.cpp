@@ -286,9 +286,12 @@ TEST_CASE("an open mesh gets another sign method, and build reports why") {
     CHECK(centre() < 0);
     CHECK_THAT(built({}), Catch::Contains("winding: ") && Catch::Contains("boundary edges"));
     CHECK_THAT(run({"info", output.string()}).out, Catch::Contains("winding: ") && Catch::Contains("boundary edges"));
-    built({"--sign", "flood", "--gap", "2"});
+    CHECK(json["hasInside"] == true);
+    const std::string hollow = "note           the field has no inside";
+    CHECK_THAT(built({"--sign", "flood", "--gap", "2"}), Catch::Contains(hollow));
     CHECK(centre() > 0);
-    built({"--sign", "flood", "--gap", "25"});
+    CHECK(nlohmann::json::parse(built({"--sign", "flood", "--gap", "2", "--json"}))["hasInside"] == false);
+    CHECK_THAT(built({"--sign", "flood", "--gap", "25"}), !Catch::Contains(hollow));
     CHECK(centre() < 0);
 }
 
