@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# usage: build.sh: builds the web site into build/docs/html. Undocumented public names, broken links and all other warnings
+# usage: build.sh: builds the web site into build/docs/html. Undocumented or missing public names, broken links and all other warnings
 # are errors.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -12,3 +12,4 @@ doxygen docs/site/Doxyfile
 ln -s "$PWD"/{README.md,CHANGELOG.md,CONTRIBUTING.md,SECURITY.md,RELEASE.md,LICENSE,docs} "$out/source/"
 /usr/bin/sphinx-build -q -W --keep-going -b html -d "$out/doctrees" -c docs/site "$out/source" "$out/html"
 python3 docs/site/check_links.py "$out/html"
+/usr/bin/python3 docs/site/check_names.py "$out/html"

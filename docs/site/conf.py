@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[2]
 XML = ROOT / "build" / "docs" / "doxygen" / "xml"
-NAMESPACES = ("bilayer", "bilayer::bullet", "bilayer::fluid")
+NAMESPACES = ("bilayer", "bilayer::bullet", "bilayer::fluid", "bilayer::metadata")
 
 project = "bilayer"
 copyright = "the authors of bilayer"
@@ -62,32 +62,44 @@ def contents():
                    for caption, pages in [("All pages", ["docs/README"]), *navigation()])
 
 
-def declared(xml):
-    """What Doxygen found in a header: directives of Breathe with the names of types, functions and constants, by place."""
-    for inner in xml.iter("innerclass"):
+def types(file):
+    """Breathe's directives for the types that Doxygen found in a file, by line."""
+    for inner in file.iter("innerclass"):
         kind = "class" if inner.get("refid").startswith("class") else "struct"
         detail = "::detail::" in inner.text or inner.get("prot") == "private"
         if not detail and inner.text.rpartition("::")[0] in NAMESPACES:
             place = ElementTree.parse(XML / f"{inner.get('refid')}.xml").find("compounddef/location").get("line")
             yield int(place), f"doxygen{kind}", inner.text, ":members:\n"
-    for member in xml.iter("memberdef"):
-        name, kind = member.findtext("qualifiedname"), member.get("kind")
-        types = ["".join(parameter.find("type").itertext()) for parameter in member.iter("param")]
-        arguments = f"({', '.join(types)})" if kind == "function" else ""
+
+
+def members(namespace, header):
+    """The same for the functions, enumerations and constants of a namespace that a header declares."""
+    for member in namespace.iter("memberdef"):
+        if member.find("location").get("file") != header:
+            continue
+        kind = member.get("kind")
+        name = f"{namespace.findtext('compoundname')}::{member.findtext('name')}"
+        parameters = ["".join(parameter.find("type").itertext()) for parameter in member.findall("param")]
+        arguments = f"({', '.join(parameters)})" if kind == "function" else ""
         yield int(member.find("location").get("line")), f"doxygen{kind}", name + arguments, ""
+
+
+def declared(header, compounds):
+    """Directives for all that a header declares, in its order."""
+    for compound in compounds:
+        if compound.get("kind") == "file" and compound.find("location").get("file") == header:
+            yield from types(compound)
+        if compound.get("kind") == "namespace" and compound.findtext("compoundname") in NAMESPACES:
+            yield from members(compound, header)
 
 
 def reference(folder):
     """Directives for all public headers of a library, in the order of their declarations."""
+    roots = [ElementTree.parse(path).find("compounddef") for path in sorted(XML.glob("*.xml"))]
+    compounds = [root for root in roots if root is not None]
     for header in sorted((ROOT / folder).glob("*.h")):
         yield f"\n## `{folder}/{header.name}`\n"
-        found = set()
-        for path in XML.glob("*.xml"):
-            compound = ElementTree.parse(path).find("compounddef")
-            if compound is None or compound.get("kind") != "file" or compound.find("location").get("file") != f"{folder}/{header.name}":
-                continue
-            found.update(declared(compound))
-        for _, directive, name, options in sorted(found):
+        for _, directive, name, options in sorted(set(declared(f"{folder}/{header.name}", compounds))):
             yield f"\n```{{{directive}}} {name}\n{options}```\n"
 
 
