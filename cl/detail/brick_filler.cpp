@@ -65,7 +65,7 @@ struct BrickBatch {
     QueueGuard guard{queue};
     // For a device that shares the host's memory: a command directly after the kernels. PoCL's threads run one such
     // command before the next kernel, and others after it.
-    std::optional<MappedBuffer<std::byte>> results;
+    std::optional<MappedBuffer> results;
 };
 
 // The results of a batch on the host.
@@ -115,7 +115,7 @@ class BrickFill {
     cl::Program program_;
     std::optional<DeviceBins> bins_;
     PartBytes bytes_;
-    cl::Buffer orders_;
+    cl::Buffer orders_;  // bitOrders, for processors
     std::size_t scratchGroups_ = 0;
     cl_uint scratchCells_ = 0;
     std::optional<BatchPlan> plan_;
@@ -166,7 +166,7 @@ BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const Fil
                                 (doubleLayer_ && job.layers.cube > 0 ? " -D PAPER_CUBE=1" : ""))),
       guard_(device.queue) {
     const float reach = reachOf(job);
-    if (doubleLayer_)
+    if (mode_.fillsBricks)
         orders_ = memory_.upload(bitOrders.data(), sizeof bitOrders, purpose, timing_.event(Timing::Command::upload));
     bins_.emplace(device, program_, memory_, job, reach, doubleLayer_ ? reach : reach + 1, mode_.gpuMapping, timing_);
     job.mesh.progress.begin(bins_->bricks());
@@ -230,8 +230,7 @@ void BrickFill::enqueueKernels(BrickBatch& batch, std::size_t first) {
     } else if (doubleLayer_) {
         prepare("prepareBricks", bricks, b.unsorted, b.columns, b.ofBricks, stride, batch.next, layers);
         enqueue(batch.queue, "fillBlocks", batch.size.blocks, bins.grid(), bins.cellOfBrick(), bins.partOffsets(),
-                firstBrick, b.columns, b.ofBricks, stride, layers, orders_, b.origins, b.distances, triangles,
-                b.counts);
+                firstBrick, b.columns, b.ofBricks, stride, layers, b.origins, b.distances, triangles, b.counts);
     } else {
         prepare("prepareBricks", scratchGroups_, b.parts, b.unsorted, b.sorted, b.cells, b.columns, b.begins, stride,
                 batch.scratch, scratchCells_, b.ofBricks, batch.next);
@@ -253,7 +252,7 @@ void BrickFill::start(BrickBatch& batch, const BatchPlan::Range& bricks) {
     enqueueKernels(batch, bricks.first);
     if (device_.info.unifiedMemory && !keep_) {
         const ResultLayout layout(b.capacity.blocks, mode_.triangles);
-        batch.results.emplace(batch.queue, b.results, layout.end, timing_, &batch.counted);
+        batch.results.emplace(batch.queue, b.results, layout.end, timing_, batch.counted);
     } else {
         batch.queue.enqueueReadBuffer(b.counts, CL_FALSE, 0, sizeof batch.counts, &batch.counts, nullptr,
                                       &batch.counted);

@@ -3,7 +3,6 @@
 // Tested by tests/cl/filler.cpp through openclFiller().
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>

@@ -171,11 +171,11 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
     }
 }
 
-// A group fills a block of a brick. For each byte, `orders` has the positions of its bits.
+// A group fills a block of a brick.
 GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global const uint* partOffsets, uint firstBrick,
                              global float* sorted, global uint* begins, uint stride, Layers layers,
-                             global const ulong* orders, global int* origins, global float* distances,
-                             global int* nearestTriangles, global uint* counters) {
+                             global int* origins, global float* distances, global int* nearestTriangles,
+                             global uint* counters) {
     SHARED Scratch work;
     SHARED uint selected[1];
     const uint perBrick = blocksPerBrick(&grid), brick = (uint)(get_group_id(0)) / perBrick;
@@ -184,8 +184,7 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
                          stride,
                          begins + brick * cursorsOf(&grid),
                          cellsFor(&grid),
-                         layers,
-                         orders};
+                         layers};
     const int3 inBrick = firstVoxel(&grid, (uint)(get_group_id(0)) % perBrick);
     if (!hasSamples(&input, inBrick)) return;
 #if TRIANGLES

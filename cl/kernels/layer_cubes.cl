@@ -23,7 +23,9 @@ typedef struct {
     global const uint* begins;  // first samples of the brick's cells
     SampleCells cells;
     Layers layers;
+#if ITEMS == 1
     global const ulong* orders;  // see addSelected()
+#endif
 } Input;
 
 // Whether any sample is in the cells around a block.

@@ -47,8 +47,12 @@ class Compressor {
         const auto order = hn::PromoteTo(indexTag, hn::LoadU(hn::Rebind<std::uint8_t, E>(), order_));
         return hn::TableLookupLanes(values, hn::IndicesFromVec(tag, order));
     }
-
 #endif
+    /// Writes a whole vector: the lanes of the mask first.
+    template <class E>
+    HWY_INLINE void store(E tag, hn::Vec<E> values, hn::TFromD<E>* to) const {
+        hn::StoreU((*this)(tag, values), tag, to);
+    }
     HWY_INLINE std::size_t count() const {
         return count_;
     }  ///< lanes of the mask

@@ -86,14 +86,11 @@ struct Narrowing {
         const Tag tag;
         to.makeRoom(treeWidth);
         const Compressor<Tag> kept(tag, mask);
-        const auto compress = [&](auto d, auto values, auto* column) {
-            hn::StoreU(kept(d, values), d, column + to.count);
-        };
         for (int k = 0; k < 3; ++k) {
-            compress(tag, hn::LoadU(tag, boxes.lower[k] + i), to.lower[k].data());
-            compress(tag, hn::LoadU(tag, boxes.upper[k] + i), to.upper[k].data());
+            kept.store(tag, hn::LoadU(tag, boxes.lower[k] + i), to.lower[k].data() + to.count);
+            kept.store(tag, hn::LoadU(tag, boxes.upper[k] + i), to.upper[k].data() + to.count);
         }
-        compress(IndexTag(), nodes, to.nodes.data());
+        kept.store(IndexTag(), nodes, to.nodes.data() + to.count);
         to.count += kept.count();
     }
 };

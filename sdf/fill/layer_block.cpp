@@ -95,9 +95,9 @@ struct LayerPoints {
         hn::StoreU(py, tag, y + first);
         hn::StoreU(pz, tag, z + first);
         hn::StoreU(hn::Mul(square(px, py, pz), hn::Set(tag, 0.5f)), tag, halfSquare + first);
-        const Compressor<Tag> compress(tag, near);
-        hn::StoreU(compress(indexTag, numbers), indexTag, picked + count);
-        count += compress.count();
+        const Compressor<Tag> kept(tag, near);
+        kept.store(indexTag, numbers, picked + count);
+        count += kept.count();
     }
 
     float *x, *y, *z, *halfSquare;  // of all points, in the order of the brick's samples

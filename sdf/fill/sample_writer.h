@@ -45,17 +45,14 @@ class SampleWriter {
             hn::Add(hn::Mul(hn::Add(hn::Mul(cellAt(place.x), size), cellAt(place.y)), size), cellAt(place.z));
         to_.reserve(to_.count + hn::Lanes(tag));
         const Compressor<D> kept(tag, near);
-        const auto compress = [&](auto d, auto values, auto* column) {
-            hn::StoreU(kept(d, values), d, column + to_.count);
-        };
-        compress(tag, place.x, to_.columns.place[0].data());
-        compress(tag, place.y, to_.columns.place[1].data());
-        compress(tag, place.z, to_.columns.place[2].data());
-        compress(tag, offset.x, to_.columns.offset[0].data());
-        compress(tag, offset.y, to_.columns.offset[1].data());
-        compress(tag, offset.z, to_.columns.offset[2].data());
-        compress(intTag, triangle, to_.columns.triangle.data());
-        compress(intTag, cell, to_.cell.data());
+        kept.store(tag, place.x, to_.columns.place[0].data() + to_.count);
+        kept.store(tag, place.y, to_.columns.place[1].data() + to_.count);
+        kept.store(tag, place.z, to_.columns.place[2].data() + to_.count);
+        kept.store(tag, offset.x, to_.columns.offset[0].data() + to_.count);
+        kept.store(tag, offset.y, to_.columns.offset[1].data() + to_.count);
+        kept.store(tag, offset.z, to_.columns.offset[2].data() + to_.count);
+        kept.store(intTag, triangle, to_.columns.triangle.data() + to_.count);
+        kept.store(intTag, cell, to_.cell.data() + to_.count);
         to_.count += kept.count();
     }
 

@@ -5,11 +5,7 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <fstream>
-#include <memory>
 
-#include <bilayer/sdf/grids.h>
-#include <bilayer/sdf/vdb_io.h>
-#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
@@ -154,19 +150,6 @@ TEST_CASE("the built file of a body of any size can be read") {
         INFO(read.err);
         CHECK(read.status == 0);
     }
-}
-
-TEST_CASE("bodies that are damaged") {
-    const auto path = scratch("body.vdb"), broken = scratch("broken_body.vdb");
-    REQUIRE(run({"build", sphereFile().string(), "-o", path.string(), "--voxel-size", "0.1", "--body"}).status == 0);
-    auto grids = std::make_shared<bilayer::Grids>(bilayer::readVdb(path).grids());
-    grids->points = nullptr;
-    bilayer::writeVdb(broken, bilayer::LevelSet(grids));
-    requireFault({"info", broken.string()}, "broken_body.vdb: the body is damaged: it has no surface points");
-    requireFault({"info", broken.string(), "--json"}, "broken_body.vdb");
-    // a file is checked whole, whatever is read of it
-    requireFault({"query", broken.string()}, "broken_body.vdb: the body is damaged: it has no surface points",
-                 {.input = "0 0 0\n"});
 }
 
 TEST_CASE("points that cannot be parsed") {

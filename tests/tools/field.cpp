@@ -58,11 +58,29 @@ TEST_CASE("query answers line by line") {
     CHECK((d[3] > 0 && band[3] == 0 && x[3] == 0));
 }
 
-TEST_CASE("Every command refuses a file whose body has an entry out of range, by its name") {
+TEST_CASE("Every command refuses a file whose body is damaged, and says what is wrong") {
     const std::string good = scratch("body.vdb").string(), bad = scratch("bad_body.vdb").string(),
                       output = rejectedOutput();
     buildSphere(good, {"--voxel-size", "0.05", "--body"});
     const LevelSet field = readVdb(good);
+    const auto checkRefused = [&](const openvdb::GridCPtrVec& grids, const std::string& reason) {
+        writeGrids(bad, grids);
+        const Words commands[] = {{"info", bad},
+                                  {"info", bad, "--json"},
+                                  {"query", bad},
+                                  {"surface", bad, "-o", output + ".ply"},
+                                  {"export", bad, "-o", output + ".nvdb"},
+                                  {"seed", bad, "--voxel-size", "0.05", "-o", output + ".vdb"}};
+        for (const Words& command : commands) {
+            const Result r = run(command, {.input = "0.55 0 0"});
+            CAPTURE(command, reason, r.out, r.err);
+            CHECK(r.status == 1);
+            CHECK(r.out.empty());
+            CHECK(r.errorLines() == 1);
+            CHECK_THAT(r.err, Catch::Contains(bad) && Catch::Contains(reason));
+        }
+    };
+    checkRefused({inWorld(field.grids().distance, field)}, "the body is damaged: it has no surface points");
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     const auto number = [](auto value) { return std::make_shared<openvdb::TypedMetadata<decltype(value)>>(value); };
     const std::pair<const char*, openvdb::Metadata::Ptr> entries[] = {
@@ -75,20 +93,7 @@ TEST_CASE("Every command refuses a file whose body has an entry out of range, by
     for (const auto& [name, value] : entries) {
         const auto distance = inWorld(field.grids().distance, field);
         distance->insertMeta(name, *value);
-        writeGrids(bad, {distance, field.grids().points});
-        const Words commands[] = {{"info", bad},
-                                  {"query", bad},
-                                  {"surface", bad, "-o", output + ".ply"},
-                                  {"export", bad, "-o", output + ".nvdb"},
-                                  {"seed", bad, "--voxel-size", "0.05", "-o", output + ".vdb"}};
-        for (const Words& command : commands) {
-            const Result r = run(command, {.input = "0.55 0 0"});
-            CAPTURE(command.front(), name, value->str(), r.out, r.err);
-            CHECK(r.status == 1);
-            CHECK(r.out.empty());
-            CHECK(r.errorLines() == 1);
-            CHECK_THAT(r.err, Catch::Contains(bad) && Catch::Contains(name));
-        }
+        checkRefused({distance, field.grids().points}, name);
     }
 }
 
