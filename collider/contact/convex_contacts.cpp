@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "collider/contact/collider_data.h"
+#include "collider/contact/edge_contacts.h"
 #include "collider/contact/edge_probes.h"
 #include "collider/contact/edge_search.h"
 #include "collider/contact/local_field.h"
@@ -115,6 +116,7 @@ void probeFeatures(const ConvexInField& body, ContactReport& report, std::vector
         if (const auto found = body.local.probe(point, samples[i], convex.radius(i), i, body.options.margin, report))
             contacts.push_back(*found);
     }
+    const EdgeContacts edges(body.local, body.options.margin);
     auto feature = static_cast<std::uint32_t>(vertices.size());
     for (const Convex::Edge& edge : convex.edges()) {
         ProbedEdge probed{[&](float fraction) { return body.intoField(convex.place(edge, fraction)); },
@@ -124,7 +126,7 @@ void probeFeatures(const ConvexInField& body, ContactReport& report, std::vector
                           edge.conormals};
         if (edge.conormals)
             probed.conormals = Conormals{body.toField * (*edge.conormals)[0], body.toField * (*edge.conormals)[1]};
-        body.local.probeEdge(probed, samples[edge.from], samples[edge.to], body.options.margin, report, contacts);
+        edges.find(probed, samples[edge.from], samples[edge.to], report, contacts);
         feature = (feature + (2u << probeBits)) & ~featureOfB;
     }
 }
@@ -281,7 +283,8 @@ class PointsOnConvex {
                               true,
                               0,
                               std::nullopt};
-        auto found = local_.deepestContact(path, 0, here, 1, local_.at(body_.intoField(end)), body_.options.margin);
+        const EdgeContacts edges(local_, body_.options.margin);
+        auto found = edges.deepest(path, 0, here, 1, local_.at(body_.intoField(end)));
         if (!found || found->distance < minDistance) return std::nullopt;
         // within a face the face's normal counts, on its border the field's
         const Contact border = local_.contact(body_.intoField(end), -(body_.toField * nearest.normal), 0, 0);

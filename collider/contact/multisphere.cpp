@@ -32,7 +32,9 @@ MultisphereHull::MultisphereHull(std::vector<SphereOfHull> spheres) {
         };
         bool isContained = false;
         for (std::size_t j = 0; j < spheres.size(); ++j) isContained |= isContainedIn(j);
-        if (!isContained) spheres_.push_back(spheres[i]);
+        if (isContained) continue;
+        spheres_.push_back(spheres[i]);
+        vertices_.push_back(spheres[i].centre);
     }
     minRadius_ = std::numeric_limits<float>::max();
     for (const SphereOfHull& sphere : spheres_) {
@@ -42,7 +44,7 @@ MultisphereHull::MultisphereHull(std::vector<SphereOfHull> spheres) {
     const auto count = static_cast<std::uint32_t>(spheres_.size());
     for (std::uint32_t i = 0; i < count; ++i)
         for (std::uint32_t j = i + 1; j < count; ++j) {
-            pairs_.emplace_back(i, j);
+            edges_.push_back({i, j, 0});
             for (std::uint32_t k = j + 1; k < count; ++k) addPlanes(i, j, k);
         }
 }
@@ -97,14 +99,14 @@ MultisphereHull::Candidate MultisphereHull::aroundPair(const SphereOfHull& from,
     return {glm::dot(point - centre, normal) - radius, normal, centre, radius};
 }
 
-NearestPoint MultisphereHull::nearest(const glm::vec3& place) const {
+NearestPoint MultisphereHull::nearest(const glm::vec3& place, float) const {
     const glm::dvec3 point(place);
     Candidate best = aroundSphere(spheres_.front(), point);
     const auto consider = [&](const Candidate& candidate) {
         if (candidate.distance < best.distance) best = candidate;
     };
     for (const SphereOfHull& sphere : spheres_) consider(aroundSphere(sphere, point));
-    for (const auto& [i, j] : pairs_) consider(aroundPair(spheres_[i], spheres_[j], point));
+    for (const ConvexEdge& edge : edges_) consider(aroundPair(spheres_[edge.from], spheres_[edge.to], point));
     for (const TangentPlane& plane : planes_) {
         const double distance = glm::dot(plane.normal, point) - plane.offset;
         if (distance >= best.distance) continue;
@@ -129,6 +131,17 @@ NearestPoint MultisphereHull::nearest(const glm::vec3& place) const {
     return {float(best.distance), glm::vec3(best.normal), glm::vec3(best.centre), float(best.radius)};
 }
 
+glm::vec3 MultisphereHull::support(const glm::vec3& direction) const {
+    const float length = glm::length(direction);
+    const auto height = [&](const SphereOfHull& sphere) {
+        return glm::dot(direction, sphere.centre) + length * sphere.radius;
+    };
+    const SphereOfHull& farthest =
+        *std::max_element(spheres_.begin(), spheres_.end(),
+                          [&](const SphereOfHull& a, const SphereOfHull& b) { return height(a) < height(b); });
+    return length > 0 ? farthest.centre + farthest.radius / length * direction : farthest.centre;
+}
+
 /// The distance from a point to the hull's support plane in a direction.
 double MultisphereHull::along(const glm::dvec3& direction, const glm::dvec3& point) const {
     double minDistance = std::numeric_limits<double>::max();
@@ -145,7 +158,7 @@ MultisphereHull::Candidate MultisphereHull::inside(const glm::dvec3& point) cons
         if (distance > best.distance) best.distance = distance, best.normal = normal;
     };
     for (const SphereOfHull& sphere : spheres_) consider(aroundSphere(sphere, point).normal);
-    for (const auto& [i, j] : pairs_) consider(aroundPair(spheres_[i], spheres_[j], point).normal);
+    for (const ConvexEdge& edge : edges_) consider(aroundPair(spheres_[edge.from], spheres_[edge.to], point).normal);
     for (const TangentPlane& plane : planes_) consider(plane.normal);
     best.centre = point - (best.distance + minRadius_) * best.normal;
     return best;

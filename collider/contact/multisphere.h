@@ -5,28 +5,24 @@
 #pragma once
 
 #include <glm/vec3.hpp>
-#include <utility>
 #include <vector>
 
 #include <bilayer/collider/shapes.h>
-#include "collider/contact/nearest_point.h"
+#include "collider/contact/convex_core.h"
 
 namespace bilayer::detail {
 
-class MultisphereHull {
+class MultisphereHull : public ConvexCore {
   public:
-    MultisphereHull() = default;
     /// Takes at least one sphere. Takes O(n^4) time for n of them.
     explicit MultisphereHull(std::vector<SphereOfHull> spheres);
 
     /// The nearest point of the surface. Its core point is the centre of a sphere inside the hull that touches the
     /// surface there. Exact up to rounding, outside and inside. Takes O(n^2) outside, O(n^3) inside.
-    NearestPoint nearest(const glm::vec3& point) const;
-
-    /// The spheres that no other one contains.
-    const std::vector<SphereOfHull>& spheres() const { return spheres_; }
-    /// Pairs of spheres with a tangent cone; some cones may be inside the hull.
-    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs() const { return pairs_; }
+    NearestPoint nearest(const glm::vec3& point, float reach) const override;
+    bool isRound(const NearestPoint&) const override { return true; }
+    glm::vec3 support(const glm::vec3& direction) const override;
+    float radius(std::uint32_t vertex) const override { return spheres_[vertex].radius; }
 
   private:
     struct TangentPlane {
@@ -47,8 +43,7 @@ class MultisphereHull {
     Candidate inside(const glm::dvec3& point) const;
     double along(const glm::dvec3& direction, const glm::dvec3& point) const;
 
-    std::vector<SphereOfHull> spheres_;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+    std::vector<SphereOfHull> spheres_;  ///< that no other one contains; the vertices are their centres
     std::vector<TangentPlane> planes_;
     float size_ = 0, minRadius_ = 0;  ///< [m]
 };

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "collider/contact/edge_contacts.h"
 #include "collider/contact/nearest_on_triangle.h"
 
 namespace bilayer::detail {

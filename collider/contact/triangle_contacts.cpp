@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "collider/contact/body_transform.h"
+#include "collider/contact/edge_contacts.h"
 #include "collider/contact/face_contacts.h"
 #include "collider/contact/narrow_phase.h"
 #include "collider/contact/nearby_triangles.h"
@@ -60,7 +61,7 @@ class TriangleProbes {
     void visitEdge(std::uint32_t f, int i, const ProbedEdge& edge, const LocalField::FieldSample& first,
                    const LocalField::FieldSample& last) const {
         const std::size_t before = contacts_.size();
-        field_.local.probeEdge(edge, first, last, field_.margin, report_, contacts_);
+        EdgeContacts(field_.local, field_.margin).find(edge, first, last, report_, contacts_);
         const auto normalOf = [&](const glm::vec3& towards) {
             return triangles_.adjacency().edgeNormal(f, i, towards);
         };

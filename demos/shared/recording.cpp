@@ -20,7 +20,10 @@ namespace bilayer {
 
 using namespace bilayer::detail;
 namespace detail {
-extern const char* const player_html;  // player.html, embedded by the build
+// the files of these names, embedded by the build
+extern const char* const player_html;
+extern const char* const player_scene_js;
+extern const char* const player_js;
 }
 }  // namespace bilayer
 
@@ -281,6 +284,8 @@ std::string Recording::data() const {
 void Recording::write(const std::filesystem::path& path) const {
     if (times_.empty()) throw std::invalid_argument("recording: no frame to write");
     std::string page = detail::player_html;
+    replace(page, "/*SCENE*/", detail::player_scene_js);
+    replace(page, "/*PLAYER*/", detail::player_js);
     replace(page, "/*THREE*/", readText(std::string(threeFolder) + "three.min.js"));
     replace(page, "/*CONTROLS*/", readText(std::string(threeFolder) + "examples/js/controls/OrbitControls.js"));
     replace(page, "/*DATA*/", data());

@@ -49,7 +49,7 @@ WindingInBall::WindingInBall(const WindingNumber& winding, const glm::dvec3& cen
     }
 }
 
-// The kernel of WindingNumber about a triangle's centre: its term of first order integrates to 0, and those of order
+// The kernel of WindingCluster about a triangle's centre: its term of first order integrates to 0, and those of order
 // k - 1 > 1 are at most k t^(k - 1) / R^2 with t = radius / R < 1/4, in sum less than 5 t^2 / R^2.
 void WindingInBall::addTriangles(const Node& leaf) {
     for (std::uint32_t i = leaf.begin; i < leaf.end; ++i) {
@@ -65,14 +65,14 @@ void WindingInBall::addTriangles(const Node& leaf) {
 }
 
 // A displacement d of the point is one of -d of all triangles: the moments of the cluster about its centre, less d, are
-// polynomials in d, and so is the expansion of WindingNumber. Its bound holds for |s - d| in place of |s|, whose square
+// polynomials in d, and so is the expansion of WindingCluster. Its bound holds for |s - d| in place of |s|, whose square
 // integrates to at most (sqrt(spread) + radius sqrt(total))^2.
 void WindingInBall::addFar(const Node& node, const glm::dvec3& toCentre, double radius) {
     const double squared = glm::dot(toCentre, toCentre), distance = std::sqrt(squared);
     const double t = (node.radius + radius) / distance, unit = 1 / (4 * glm::pi<double>() * squared);
     const double spread = std::sqrt(node.spread) + radius * std::sqrt(node.total);
     far_.error += unit * spread * spread / squared * t * (4 - 3 * t) / ((1 - t) * (1 - t));
-    far_.value += winding_.expansion(node, centre_).value;
+    far_.value += node.expansion(centre_).value;
     const glm::dvec3 u = toCentre / distance, mu = times(node.moment, u);
     const double au = glm::dot(node.area, u), umu = glm::dot(u, mu);
     const double sum = node.moment[0] + node.moment[1] + node.moment[2];
@@ -105,7 +105,7 @@ WindingNumber::Estimate WindingInBall::coarseEstimate(const glm::dvec3& point) c
 WindingNumber::Estimate WindingInBall::estimate(const glm::dvec3& point) const {
     WindingNumber::Estimate sum = farEstimate(point);
     for (const Node* cluster : clusters_) {
-        const WindingNumber::Estimate part = winding_.expansion(*cluster, point);
+        const WindingNumber::Estimate part = cluster->expansion(point);
         sum.value += part.value;
         sum.error += part.error;
     }

@@ -6,10 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
-#include <limits>
 #include <span>
 
 #include "sdf/base/progress.h"
@@ -20,8 +18,6 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::size_t leafTriangles = 12;
-/// An expansion with a larger error bound is not used: the node is opened. This also keeps the sums of errors accurate.
-constexpr double uselessError = 10;
 /// An estimate of an integer with a smaller error rounds to it: a half, less a margin for rounding.
 constexpr double surelyNearest = 0.49;
 
@@ -79,7 +75,12 @@ WindingNumber::WindingNumber(const Mesh& mesh, Progress* progress) {
                     tree.triangles_[i] = {mesh.points[t.x], mesh.points[t.y], mesh.points[t.z]};
                 }
                 node.right = 0;
-                return tree.sumTriangles(node);
+                const std::span<const Corners> triangles(tree.triangles_.data() + begin, end - begin);
+                static_cast<WindingCluster&>(node) = WindingCluster(triangles);
+                Bounds box;
+                for (const Corners& triangle : triangles)
+                    for (const glm::vec3& corner : triangle) box.add(corner);
+                return box;
             }
             const std::size_t middle = splitAtMedian(items, begin, end, progress), left = at + 1;
             const std::size_t right = left + medianTreeNodes(middle - begin, leafTriangles);
@@ -89,68 +90,11 @@ WindingNumber::WindingNumber(const Mesh& mesh, Progress* progress) {
                 end - begin, [&] { box = (*this)(left, begin, middle); }, [&] { other = (*this)(right, middle, end); });
             box.add(other.lower);
             box.add(other.upper);
-            tree.sumChildren(node, tree.nodes_[left], tree.nodes_[right], box);
+            static_cast<WindingCluster&>(node) = WindingCluster(tree.nodes_[left], tree.nodes_[right], box);
             return box;
         }
     };
     Builder{*this, mesh, items, progress}(0, 0, count);
-}
-
-Bounds WindingNumber::sumTriangles(Node& node) const {
-    const std::span triangles(triangles_.data() + node.begin, triangles_.data() + node.end);
-    glm::dvec3 weighted(0), plain(0);
-    node.total = 0;
-    node.area = glm::dvec3(0);
-    for (const Corners& t : triangles) {
-        const glm::dvec3 a(t[0]), b(t[1]), c(t[2]), n = 0.5 * glm::cross(b - a, c - a), middle = (a + b + c) / 3.0;
-        node.total += glm::length(n);
-        node.area += n;
-        weighted += glm::length(n) * middle;
-        plain += middle;
-    }
-    node.centre = node.total > 0 ? weighted / node.total : plain / double(triangles.size());
-    node.radius = node.spread = 0;
-    node.moment = {};
-    node.moment2 = {};
-    Bounds box;
-    for (const Corners& t : triangles) {
-        const glm::dvec3 a = glm::dvec3(t[0]) - node.centre, b = glm::dvec3(t[1]) - node.centre,
-                         c = glm::dvec3(t[2]) - node.centre;
-        const glm::dvec3 n = 0.5 * glm::cross(b - a, c - a), s = (a + b + c) / 3.0;
-        node.radius = std::max({node.radius, glm::length(a), glm::length(b), glm::length(c)});
-        // The integral of x x^T over a triangle: area / 12 (a a^T + b b^T + c c^T + 9 s s^T).
-        Symmetric2 second{};
-        for (const glm::dvec3& corner : {a, b, c}) add(second, product(corner, corner), 1.0 / 12);
-        add(second, product(s, s), 9.0 / 12);
-        node.spread += glm::length(n) * (second[0] + second[1] + second[2]);
-        add(node.moment, product(s, n));
-        add(node.moment2, product(second, n));
-        for (const glm::vec3& corner : t) box.add(corner);
-    }
-    return box;
-}
-
-void WindingNumber::sumChildren(Node& node, const Node& left, const Node& right, const Bounds& box) const {
-    node.total = left.total + right.total;
-    node.centre = node.total > 0 ? (left.total * left.centre + right.total * right.centre) / node.total
-                                 : 0.5 * (left.centre + right.centre);
-    node.area = left.area + right.area;
-    node.moment = {};
-    node.moment2 = {};
-    node.spread = 0;
-    double radius = 0;
-    for (const Node* child : {&left, &right}) {
-        const glm::dvec3 s = child->centre - node.centre;
-        radius = std::max(radius, glm::length(s) + child->radius);
-        node.spread += child->spread + child->total * glm::dot(s, s);
-        add(node.moment, child->moment);
-        add(node.moment, product(s, child->area));
-        add(node.moment2, child->moment2);
-        add(node.moment2, product(child->moment, s), 2);
-        add(node.moment2, product(product(s, s), child->area));
-    }
-    const glm::dvec3 corner = glm::max(node.centre - glm::dvec3(box.lower), glm::dvec3(box.upper) - node.centre);
-    node.radius = std::min(radius, glm::length(corner));
 }
 
 double WindingNumber::solidAngles(const Node& node, const glm::dvec3& point) const {
@@ -160,25 +104,6 @@ double WindingNumber::solidAngles(const Node& node, const glm::dvec3& point) con
         angle += solidAngle(glm::dvec3(t[0]) - point, glm::dvec3(t[1]) - point, glm::dvec3(t[2]) - point).value;
     }
     return angle / (4 * glm::pi<double>());
-}
-
-// The kernel n . (x - q) / |x - q|^3 is expanded in s = x - centre to second order. The term of order k - 1 is the
-// gradient of a solid harmonic of degree k, at most k |s|^(k - 1) / R^(k + 1) (Bernstein's inequality), with R =
-// |centre - q|. For |s| <= t R the truncated terms sum to at most t |s|^2 / R^4 (4 - 3 t) / (1 - t)^2.
-WindingNumber::Estimate WindingNumber::expansion(const Node& node, const glm::dvec3& point) const {
-    const glm::dvec3 toCentre = node.centre - point;
-    const double squared = glm::dot(toCentre, toCentre), distance = std::sqrt(squared);
-    if (!(node.radius < distance)) return {0, std::numeric_limits<double>::infinity()};
-    const double t = node.radius / distance, unit = 1 / (4 * glm::pi<double>() * squared);
-    const double error = unit * node.spread / squared * t * (4 - 3 * t) / ((1 - t) * (1 - t));
-    if (!(error < uselessError)) return {0, error};
-    const glm::dvec3 u = toCentre / distance;
-    const Symmetric2& m = node.moment;
-    const double along = m[0] * u.x * u.x + m[1] * u.y * u.y + m[2] * u.z * u.z +
-                         2 * (m[3] * u.x * u.y + m[4] * u.y * u.z + m[5] * u.z * u.x);
-    const double first = (m[0] + m[1] + m[2] - 3 * along) / distance;
-    const double second = (7.5 * cubic(node.moment2, u) - 4.5 * trace(node.moment2, u)) / squared;
-    return {unit * (glm::dot(node.area, u) + first + second), error};
 }
 
 WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point, double share) const {
@@ -195,8 +120,8 @@ WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point, double 
             const std::uint32_t at = open.back();
             open.pop_back();
             const Node& node = nodes_[at];
-            const Estimate far = expansion(node, point);
-            if (far.error < uselessError) {
+            const Estimate far = node.expansion(point);
+            if (far.error < WindingCluster::uselessError) {
                 sum.value += far.value;
                 sum.error += far.error;
                 heap.push_back({far, at});

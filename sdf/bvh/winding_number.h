@@ -7,14 +7,13 @@
 // Tested by tests/sdf/winding.cpp.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
-#include "sdf/bvh/symmetric_tensors.h"
+#include "sdf/bvh/winding_cluster.h"
 
 namespace bilayer::detail {
 
@@ -28,10 +27,7 @@ class WindingNumber {
     /// @param progress  polled while the hierarchy is built, unless null
     explicit WindingNumber(const Mesh& mesh, Progress* progress = nullptr);
 
-    /// The true winding number differs from `value` by at most `error`, plus rounding (about 1e-12).
-    struct Estimate {
-        double value, error;
-    };
+    using Estimate = WindingEstimate;
 
     /// Computes the winding number at a point [m]. Refines until the error is below `share` (0..1) times the difference
     /// of the value from 1/2. If necessary it descends to single triangles. The result is therefore on the correct side
@@ -57,24 +53,14 @@ class WindingNumber {
     /// rounding.
     static constexpr double onlySide = 0.999;
 
-    using Corners = std::array<glm::vec3, 3>;
-    struct Node {
-        glm::dvec3 centre;         // area-weighted
-        double radius;             // of a ball around `centre` that contains all triangles
-        double total;              // area
-        glm::dvec3 area;           // integral of the normal n
-        Symmetric2 moment;         // of s n^T, symmetric part, s relative to the centre
-        Symmetric3 moment2;        // of s s^T (x) n, symmetric part
-        double spread;             // integral of |s|^2
+    using Corners = WindingCluster::Corners;
+    struct Node : WindingCluster {
         std::uint32_t begin, end;  // range of triangles
         std::uint32_t right;       // the second child, or 0 for a leaf; the first child is the next node
     };
     struct Item;
 
-    Bounds sumTriangles(Node& node) const;
-    void sumChildren(Node& node, const Node& left, const Node& right, const Bounds& box) const;
     double solidAngles(const Node& node, const glm::dvec3& point) const;
-    Estimate expansion(const Node& node, const glm::dvec3& point) const;
     void refine(const Node& node, std::uint32_t at, const glm::dvec3& point, Estimate& sum,
                 std::vector<std::uint32_t>& open) const;
 

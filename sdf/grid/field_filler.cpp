@@ -47,6 +47,35 @@ Assembler::Plain plainBlocks(const BuildOptions& options, Sign sign) {
     return sign == Sign::normals && enclosesSurface(options) ? Assembler::Plain::drop : Assembler::Plain::keep;
 }
 
+// Lets a job fill a part of the field only.
+void restrict(MeshJob& job, const FieldPart* part) {
+    if (!part) return;
+    job.isPart = true;
+    job.wanted = [box = part->filled()](const glm::ivec3& first, int side) { return box.overlaps(first, side); };
+}
+
+void makePositive(openvdb::FloatGrid& distance) {
+    openvdb::tree::LeafManager<openvdb::FloatTree> leaves(distance.tree());
+    leaves.foreach ([](auto& leaf, std::size_t) {
+        float* values = leaf.buffer().data();
+        std::transform(values, values + blockVoxels, values, [](float value) { return std::abs(value); });
+    });
+}
+
+// The normals of a balanced mesh that self-intersects can be wrong without a conflict, where two walls are near all
+// voxels between them. Signs of voxels within one voxel of the surface are corrected. Farther wrong regions may extend
+// beyond the band.
+void repair(openvdb::FloatGrid& distance, const Mesh& mesh, const BuildOptions& options, Progress& progress,
+            FieldSigns& signs) {
+    const float limit = enclosesSurface(options) ? options.voxelSize : 0;
+    const SignRepair repair = repairSigns(distance, mesh, limit, &progress);
+    signs.conflicts += repair.refused;
+    if (repair.repaired == 0) return;
+    signs.name = nameOf(Sign::winding);
+    signs.reason = fmt::format("{}, but the surface intersects itself; {} voxels have the side of their winding number",
+                               signs.reason, repair.repaired);
+}
+
 }  // namespace
 
 FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const DeviceFiller* device,
@@ -60,12 +89,6 @@ FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const De
     checkSize(mesh_, extent_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
     if (part_) extent_.box = part_->mesh;
     progress_.poll();
-}
-
-void FieldFiller::restrict(MeshJob& job) const {
-    if (!part_) return;
-    job.isPart = true;
-    job.wanted = [box = part_->filled()](const glm::ivec3& first, int side) { return box.overlaps(first, side); };
 }
 
 void FieldFiller::fillWithOwnSigns() {
@@ -88,7 +111,7 @@ void FieldFiller::fillWithOwnSigns() {
                 progress_,
                 {},
                 &undecided};
-    restrict(job);
+    restrict(job, part_);
     if (device_)
         device_->fill({job, options_, extent_.box, parameters});
     else
@@ -133,7 +156,7 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
                 byNormals,  [&](const FilledBlocks& blocks) { take(assembler, blocks); },
                 progress_,  {},
                 &undecided, &conflicts};
-    restrict(job);
+    restrict(job, part_);
     if (adapt) adapt(job, assembler);
     // Flipping triangles does not change the bounding box.
     if (device_)
@@ -150,7 +173,8 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     if (byNormals) conflicts += assembler.conflicts(*distance_);
     signs_ = {nameOf(sign), reason, conflicts, undecided};
     const bool isKnownToBeClean = options_.inspected && options_.inspected->selfIntersections == 0;
-    if (byNormals && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean) repair(mesh);
+    if (byNormals && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean)
+        repair(*distance_, mesh, options_, progress_, signs_);
     trim();
     times_.assemble += part.lap();
 }
@@ -177,29 +201,11 @@ bool FieldFiller::signAgainByWinding(const Mesh& mesh, const std::string& reason
     const bool isComplete =
         filledBlocks_ > 0 && enclosesSurface(options_) && widths.exterior == widths.interior && !part_;
     if (!isComplete || options_.unite || !balanced(mesh, &progress_)) return false;
-    openvdb::tree::LeafManager<openvdb::FloatTree> leaves(distance_->tree());
-    leaves.foreach ([](auto& leaf, std::size_t) {
-        float* values = leaf.buffer().data();
-        std::transform(values, values + blockVoxels, values, [](float value) { return std::abs(value); });
-    });
+    makePositive(*distance_);
     signByWinding(*distance_, mesh, widths, true, &progress_);
     signs_ = {nameOf(Sign::winding), reason, 0, 0};
     times_.assemble += part.lap();
     return true;
-}
-
-// The normals of a balanced mesh that self-intersects can be wrong without a conflict, where two walls are near all
-// voxels between them. Signs of voxels within one voxel of the surface are corrected. Farther wrong regions may extend
-// beyond the band.
-void FieldFiller::repair(const Mesh& mesh) {
-    const float limit = enclosesSurface(options_) ? options_.voxelSize : 0;
-    const SignRepair repair = repairSigns(*distance_, mesh, limit, &progress_);
-    signs_.conflicts += repair.refused;
-    if (repair.repaired == 0) return;
-    signs_.name = nameOf(Sign::winding);
-    signs_.reason =
-        fmt::format("{}, but the surface intersects itself; {} voxels have the side of their winding number",
-                    signs_.reason, repair.repaired);
 }
 
 void FieldFiller::take(Assembler& assembler, const FilledBlocks& blocks) {

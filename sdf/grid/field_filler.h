@@ -75,11 +75,9 @@ class FieldFiller {
 
   private:
     bool fillUnion(const Mesh& mesh);
-    void repair(const Mesh& mesh);
     void take(Assembler& assembler, const FilledBlocks& blocks);  // thread-safe
     void finish(Assembler& assembler);
     void trim();  // to the part
-    void restrict(MeshJob& job) const;
 
     const Mesh& mesh_;
     const BuildOptions& options_;

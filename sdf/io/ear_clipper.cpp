@@ -2,124 +2,22 @@
 #include "sdf/io/ear_clipper.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <tuple>
 #include <utility>
 
-#include "sdf/base/line_side.h"
-
 namespace bilayer::detail {
-namespace {
 
-/// Margin for rounding in tests of boxes against lines, relative to the products; generous.
-constexpr double roundingOfLine = 1e-15;
-
-// Tests which boxes a triangle may overlap.
-class TriangleBoxTest {
-  public:
-    TriangleBoxTest(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c)
-        : box_{glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c)}, corners_{a, b, c} {}
-
-    bool operator()(const Box2& box) const {
-        return box_.meets(box) && !isBeyond(box, corners_[0], corners_[1]) &&
-               !isBeyond(box, corners_[1], corners_[2]) && !isBeyond(box, corners_[2], corners_[0]);
-    }
-
-  private:
-    // Returns whether a box lies entirely to the right of a line.
-    static bool isBeyond(const Box2& box, const glm::dvec2& a, const glm::dvec2& b) {
-        const glm::dvec2 edge = b - a;
-        const double left = edge.x * ((edge.x > 0 ? box.upper.y : box.lower.y) - a.y);
-        const double right = edge.y * ((edge.y > 0 ? box.lower.x : box.upper.x) - a.x);
-        return left - right < -roundingOfLine * (std::abs(left) + std::abs(right));
-    }
-
-    Box2 box_;
-    glm::dvec2 corners_[3];
-};
-
-double crossOf(const glm::dvec2& p, const glm::dvec2& q) {
-    return p.x * q.y - p.y * q.x;
-}
-
-double dotOf(const glm::dvec2& p, const glm::dvec2& q) {
-    return p.x * q.x + p.y * q.y;
-}
-
-// Returns whether an outline reverses at q: it leaves for r along the line from which it came, back towards p.
-bool reverses(const glm::dvec2& p, const glm::dvec2& q, const glm::dvec2& r) {
-    return dotOf(p - q, r - q) > 0 && lineSide(p, q, r) == 0;
-}
-
-// Compares directions from a point by their angles from a first one, counter-clockwise.
-class AngleOrder {
-  public:
-    AngleOrder(const glm::dvec2& centre, const glm::dvec2& first) : centre_(centre), first_(first) {}
-
-    bool isZero(const glm::dvec2& p) const { return sector(p) == 0; }
-    bool isLess(const glm::dvec2& p, const glm::dvec2& q) const {
-        const int ofP = sector(p), ofQ = sector(q);
-        return ofP != ofQ ? ofP < ofQ : ofP % 2 == 1 && lineSide(centre_, p, q) > 0;
-    }
-
-  private:
-    // 0: along the first direction; 1: to its left; 2: opposite; 3: to its right
-    int sector(const glm::dvec2& p) const {
-        const int side = lineSide(centre_, first_, p);
-        if (side != 0) return side > 0 ? 1 : 3;
-        return dotOf(first_ - centre_, p - centre_) > 0 ? 0 : 2;
-    }
-
-    glm::dvec2 centre_, first_;
-};
-
-// Returns whether an outline that only turns left does so by one revolution: there is one corner that is leftmost among
-// its neighbours.
-bool turnsOnce(std::span<const glm::dvec2> outline) {
-    const std::size_t n = outline.size();
-    const auto isLeft = [&](std::size_t i, std::size_t j) {
-        const glm::dvec2 &p = outline[i % n], &q = outline[j % n];
-        return p.x < q.x || (p.x == q.x && p.y < q.y);
-    };
-    std::size_t leftmost = 0;
-    for (std::size_t i = n; i < 2 * n; ++i) leftmost += isLeft(i, i - 1) && isLeft(i, i + 1);
-    return leftmost == 1;
-}
-
-// Calls f(previous, corner, next) with the index of each corner, skipping repeated points.
-template <typename F>
-void forEachCorner(std::span<const glm::dvec2> outline, const F& f) {
-    const std::size_t n = outline.size();
-    const auto next = [&](std::size_t i) { return i + 1 < n ? i + 1 : 0; };
-    std::size_t before = 0;
-    while (before < n && outline[before] == outline[next(before)]) ++before;
-    if (before == n) return;
-    for (std::size_t i = before, count = 0; count < n; ++count) {
-        i = next(i);
-        if (outline[i] == outline[next(i)]) continue;
-        f(unsigned(before), unsigned(i), unsigned(next(i)));
-        before = i;
-    }
-}
-
-}  // namespace
-
-int EarClipper::side(unsigned a, unsigned b, unsigned p) const {
-    return lineSide(corners_[a].at, corners_[b].at, corners_[p].at);
-}
-
-bool EarClipper::clip(std::span<const glm::dvec2> outline, std::vector<glm::uvec3>& triangles) {
-    link(outline);
-    if (!wasConvex_) separate(triangles);
+bool EarClipper::clip(std::span<const glm::dvec2> outline, Triangles& triangles) {
+    start(outline);
+    if (!wasConvex()) separate(triangles);
     tryAll();
-    for (auto rule = Rule::strict; left_ > 0;) {
-        fits_ &= rule < Rule::convex;
-        const bool all = tried_.size() == left_;
+    for (auto rule = EarRule::strict; outline_.left() > 0;) {
+        fits_ &= rule < EarRule::convex;
+        const bool all = tried_.size() == outline_.left();
         if (playRound(rule, triangles))
-            rule = Rule::strict;
+            rule = EarRule::strict;
         else if (all)
-            rule = Rule(int(rule) + 1);
+            rule = EarRule(int(rule) + 1);
         if (next_.empty())
             tryAll();
         else
@@ -128,26 +26,19 @@ bool EarClipper::clip(std::span<const glm::dvec2> outline, std::vector<glm::uvec
     return fits_;
 }
 
-void EarClipper::link(std::span<const glm::dvec2> outline) {
-    left_ = unsigned(outline.size());
+void EarClipper::start(std::span<const glm::dvec2> outline) {
+    outline_.reset(outline);
+    rounds_.assign(outline.size(), 0);
     round_ = 0;
     fits_ = true;
-    corners_.resize(left_);
-    obstacles_.reset(outline);
-    for (unsigned i = 0; i < left_; ++i)
-        corners_[i] = {outline[i], i > 0 ? i - 1 : left_ - 1, i + 1 < left_ ? i + 1 : 0, 0, true, true, false};
-    for (unsigned i = 0; i < left_; ++i) classify(i);
-    wasConvex_ = std::all_of(corners_.begin(), corners_.end(), [](const Corner& corner) { return corner.convex; }) &&
-                 turnsOnce(outline);
-    if (!wasConvex_) findFullAngles(outline);
     next_.clear();
     changed_.clear();
 }
 
 void EarClipper::tryAll() {
     tried_.clear();
-    for (unsigned i = 0; i < corners_.size(); ++i)
-        if (corners_[i].present) tried_.push_back(i);
+    for (unsigned i = 0; i < outline_.size(); ++i)
+        if (outline_[i].present) tried_.push_back(i);
 }
 
 void EarClipper::tryChanged() {
@@ -157,11 +48,11 @@ void EarClipper::tryChanged() {
 
 // Tries corners of which no neighbour was cut in the same round, so that long fans of triangles at one corner are rare.
 // Returns whether any was cut.
-bool EarClipper::playRound(Rule rule, std::vector<glm::uvec3>& triangles) {
+bool EarClipper::playRound(EarRule rule, Triangles& triangles) {
     ++round_;
     bool any = false;
     for (const unsigned v : tried_) {
-        if (!corners_[v].present || corners_[v].round == round_ || !mayCut(v, rule)) continue;
+        if (!outline_[v].present || rounds_[v] == round_ || !outline_.mayCut(v, rule)) continue;
         cut(v, triangles);
         cutEmpty(triangles);
         any = true;
@@ -169,14 +60,10 @@ bool EarClipper::playRound(Rule rule, std::vector<glm::uvec3>& triangles) {
     return any;
 }
 
-void EarClipper::cut(unsigned v, std::vector<glm::uvec3>& triangles) {
-    const unsigned a = corners_[v].before, b = corners_[v].after;
+void EarClipper::cut(unsigned v, Triangles& triangles) {
+    const unsigned a = outline_[v].before, b = outline_[v].after;
     triangles.push_back({a, v, b});
-    narrow(a, v, b);
-    narrow(b, v, a);
-    corners_[a].after = b;
-    corners_[b].before = a;
-    remove(v);
+    outline_.cut(v);
     if (finish(a, triangles)) return;
     for (const unsigned corner : {a, b}) {
         update(corner);
@@ -184,54 +71,48 @@ void EarClipper::cut(unsigned v, std::vector<glm::uvec3>& triangles) {
     }
 }
 
-void EarClipper::remove(unsigned v) {
-    corners_[v].present = false;
-    if (!corners_[v].convex) obstacles_.remove(v);
-    --left_;
-}
-
 // Removes the outline of a corner if it has at most three corners, and adds its last triangle.
-bool EarClipper::finish(unsigned v, std::vector<glm::uvec3>& triangles) {
-    const unsigned second = corners_[v].after, third = corners_[second].after;
-    if (corners_[third].after != v && third != v) return false;
+bool EarClipper::finish(unsigned v, Triangles& triangles) {
+    const unsigned second = outline_[v].after, third = outline_[second].after;
+    if (outline_[third].after != v && third != v) return false;
     if (third != v) {
         const unsigned first = std::min({v, second, third});
-        triangles.push_back({corners_[first].before, first, corners_[first].after});
-        fits_ &= side(corners_[first].before, first, corners_[first].after) >= 0;
-        remove(third);
+        triangles.push_back({outline_[first].before, first, outline_[first].after});
+        fits_ &= outline_.side(outline_[first].before, first, outline_[first].after) >= 0;
+        outline_.remove(third);
     }
-    remove(v);
-    remove(second);
+    outline_.remove(v);
+    outline_.remove(second);
     return true;
 }
 
 // Cuts repeated corners and outward spikes, as far as cuts have made some. Where they remain, parts of the outline lie
 // next to each other with nothing in between, and ears there cannot be distinguished from their surroundings.
-void EarClipper::cutEmpty(std::vector<glm::uvec3>& triangles) {
+void EarClipper::cutEmpty(Triangles& triangles) {
     while (!changed_.empty()) {
-        const unsigned v = changed_.back(), next = corners_[v].after;
-        if (corners_[v].present && corners_[v].at == corners_[next].at) {
+        const unsigned v = changed_.back(), next = outline_[v].after;
+        if (outline_[v].present && outline_[v].at == outline_[next].at) {
             cut(next, triangles);
             continue;
         }
         changed_.pop_back();
-        if (corners_[v].present && isEmpty(v)) cut(v, triangles);
+        if (outline_[v].present && outline_.isEmpty(v)) cut(v, triangles);
     }
 }
 
 // Separates an outline where its inside is pinched to a point or to a line.
-void EarClipper::separate(std::vector<glm::uvec3>& triangles) {
-    for (auto v = unsigned(corners_.size()); v-- > 0;) changed_.push_back(v);
+void EarClipper::separate(Triangles& triangles) {
+    for (auto v = outline_.size(); v-- > 0;) changed_.push_back(v);
     cutEmpty(triangles);
     tryAll();
-    const auto position = [&](unsigned v) { return std::tuple(corners_[v].at.x, corners_[v].at.y, v); };
+    const auto position = [&](unsigned v) { return std::tuple(outline_[v].at.x, outline_[v].at.y, v); };
     std::sort(tried_.begin(), tried_.end(), [&](unsigned v, unsigned w) { return position(v) < position(w); });
-    const auto differ = [&](unsigned v, unsigned w) { return corners_[v].at != corners_[w].at; };
+    const auto differ = [&](unsigned v, unsigned w) { return outline_[v].at != outline_[w].at; };
     for (auto begin = tried_.begin(); begin != tried_.end();) {
         const auto end = std::find_if(begin, tried_.end(), [&](unsigned v) { return differ(*begin, v); });
         for (auto v = begin; v != end; ++v)
             for (auto w = begin; w != end;) {
-                const bool pinched = isPinched(*v, *w);
+                const bool pinched = outline_.isPinched(*v, *w);
                 if (pinched) split(*v, *w, triangles);
                 w = pinched ? begin : w + 1;
             }
@@ -240,144 +121,22 @@ void EarClipper::separate(std::vector<glm::uvec3>& triangles) {
     cutEmpty(triangles);
 }
 
-// Returns whether two corners at the same point can be joined within the outline: the corner w arrives and leaves, in
-// this order, between the edges of v, on the inner side.
-bool EarClipper::isPinched(unsigned v, unsigned w) const {
-    const Corner &corner = corners_[v], &other = corners_[w];
-    if (v == w || !corner.present || !other.present || corner.after == w || other.after == v) return false;
-    const AngleOrder order(corner.at, corners_[corner.after].at);
-    const glm::dvec2 &end = corners_[corner.before].at, &in = corners_[other.before].at,
-                     &out = corners_[other.after].at;
-    if (order.isZero(out) || order.isLess(out, in)) return false;
-    if (!order.isLess(in, out) && !other.full) return false;
-    if (order.isZero(end)) return corner.full;
-    // if w runs along both edges of v, this point does not show on which side
-    return order.isLess(out, end) || (!order.isLess(end, out) && !order.isZero(in));
-}
-
-void EarClipper::split(unsigned v, unsigned w, std::vector<glm::uvec3>& triangles) {
-    triangles.push_back({corners_[v].before, v, w});
-    triangles.push_back({corners_[w].before, w, v});
-    std::swap(corners_[v].before, corners_[w].before);
+void EarClipper::split(unsigned v, unsigned w, Triangles& triangles) {
+    triangles.push_back({outline_[v].before, v, w});
+    triangles.push_back({outline_[w].before, w, v});
+    outline_.split(v, w);
     for (const unsigned corner : {v, w}) {
-        corners_[corners_[corner].before].after = corner;
-        corners_[corner].full = false;
         if (finish(corner, triangles)) continue;
-        classify(corner);
+        outline_.classify(corner);
         changed_.push_back(corner);
     }
 }
 
 void EarClipper::update(unsigned v) {
-    classify(v);
-    if (corners_[v].round == round_) return;
-    corners_[v].round = round_;
+    outline_.classify(v);
+    if (rounds_[v] == round_) return;
+    rounds_[v] = round_;
     next_.push_back(v);
-}
-
-void EarClipper::classify(unsigned v) {
-    Corner& corner = corners_[v];
-    const bool convex = side(corner.before, v, corner.after) > 0;
-    if (convex == corner.convex) return;
-    corner.convex = convex;
-    if (convex)
-        obstacles_.remove(v);
-    else
-        obstacles_.add(v, corner.at);
-}
-
-// Updates whether the interior angle at a corner is 360 degrees, before its edge to v becomes one to the corner behind
-// v.
-void EarClipper::narrow(unsigned at, unsigned v, unsigned to) {
-    Corner& corner = corners_[at];
-    const glm::dvec2 &from = corner.at, &across = corners_[v].at, &end = corners_[to].at;
-    if (from == across)
-        corner.full &= corners_[v].full;
-    else if (corners_[v].convex || dotOf(across - from, end - from) < 0)
-        corner.full = false;
-}
-
-bool EarClipper::isEmpty(unsigned v) const {
-    const Corner& corner = corners_[v];
-    return !corner.full && !corner.convex && reverses(corners_[corner.before].at, corner.at, corners_[corner.after].at);
-}
-
-bool EarClipper::mayCut(unsigned v, Rule rule) const {
-    const Corner& corner = corners_[v];
-    const glm::dvec2 &a = corners_[corner.before].at, &b = corners_[corner.after].at;
-    if (rule == Rule::any) return true;
-    if (rule == Rule::convex) return corner.convex;
-    if (corner.convex) return rule != Rule::flat && isEar(v, rule);
-    return rule == Rule::flat && lineSide(a, corner.at, b) == 0 && !corner.full;
-}
-
-bool EarClipper::isEar(unsigned v, Rule rule) const {
-    const Corner& corner = corners_[v];
-    if (!keepsAngles(v, rule)) return false;
-    return !obstacles_.any(TriangleBoxTest(corners_[corner.before].at, corner.at, corners_[corner.after].at),
-                           [&](std::size_t w) { return blocks(unsigned(w), v, rule); });
-}
-
-// Returns whether the cut leaves a positive angle at both of its ends. Angles of 180 degrees and more always remain.
-bool EarClipper::keepsAngles(unsigned v, Rule rule) const {
-    const unsigned a = corners_[v].before, b = corners_[v].after;
-    if (isEmpty(a) || isEmpty(b)) return false;
-    const int minSide = rule == Rule::strict ? 1 : 0;
-    return (!corners_[a].convex || side(corners_[a].before, a, b) >= minSide) &&
-           (!corners_[b].convex || side(a, b, corners_[b].after) >= minSide);
-}
-
-// Returns whether the outline at a corner w enters the triangle of corner v. If w is on the triangle's border, it
-// enters if it continues to the inner side of all edges that w lies on. Under the strict rule it must not continue
-// along the cut either.
-bool EarClipper::blocks(unsigned w, unsigned v, Rule rule) const {
-    const unsigned a = corners_[v].before, b = corners_[v].after;
-    if (w == a || w == b || w == v) return false;
-    const int first = side(a, v, w), second = side(v, b, w), cut = side(b, a, w);
-    if (first < 0 || second < 0 || cut < 0) return false;
-    if (rule == Rule::strict && cut == 0 && first > 0 && second > 0) return true;
-    const auto enters = [&](unsigned to) {
-        return (first > 0 || side(a, v, to) > 0) && (second > 0 || side(v, b, to) > 0) &&
-               (cut > 0 || side(b, a, to) >= (rule == Rule::strict ? 0 : 1));
-    };
-    return enters(corners_[w].before) || enters(corners_[w].after);
-}
-
-// Finds the corners whose interior angle is 360 degrees. The total rotation of a simple outline is one revolution to
-// the left. Outward spikes contribute half a revolution to the left each, inward spikes half a revolution to the right.
-// The other corners therefore determine the count of each kind.
-void EarClipper::findFullAngles(std::span<const glm::dvec2> outline) {
-    long spikes = 0;
-    double angle = 0;
-    forEachCorner(outline, [&](unsigned i, unsigned j, unsigned k) {
-        const glm::dvec2 &p = outline[i], &q = outline[j], &r = outline[k];
-        if (reverses(p, q, r))
-            ++spikes;
-        else
-            angle += std::atan2(crossOf(q - p, r - q), dotOf(q - p, r - q));
-    });
-    if (spikes == 0) return;
-    const long halfRevolutions = std::lround(angle / std::numbers::pi);
-    if (halfRevolutions == 2 - spikes) return;
-    forEachCorner(outline, [&](unsigned i, unsigned j, unsigned k) {
-        if (reverses(outline[i], outline[j], outline[k]) && (halfRevolutions == 2 + spikes || !isOutward(j)))
-            for (unsigned v = j; v != i && outline[v] == outline[j]; v = corners_[v].before) corners_[v].full = true;
-    });
-}
-
-// Returns whether a spike lies outside of the rest of the outline. A spike on the border counts as outside.
-bool EarClipper::isOutward(unsigned v) const {
-    const glm::dvec2& point = corners_[v].at;
-    int windings = 0;
-    const unsigned first = corners_[v].after, last = corners_[v].before;
-    for (unsigned i = first;; i = corners_[i].after) {
-        const glm::dvec2 &p = corners_[i].at, &q = corners_[i == last ? first : corners_[i].after].at;
-        const int side = lineSide(p, q, point);
-        if (side == 0 && dotOf(p - point, q - point) <= 0) return true;
-        if (p.y <= point.y && q.y > point.y && side > 0) ++windings;
-        if (p.y > point.y && q.y <= point.y && side < 0) --windings;
-        if (i == last) return windings <= 0;
-    }
 }
 
 }  // namespace bilayer::detail

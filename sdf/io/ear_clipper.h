@@ -3,13 +3,12 @@
 // Tested by tests/sdf/triangulate.cpp through triangulate().
 #pragma once
 
-#include <cstddef>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
-#include "sdf/io/point_tree.h"
+#include "sdf/io/outline.h"
 
 namespace bilayer::detail {
 
@@ -31,55 +30,28 @@ class EarClipper {
     bool clip(std::span<const glm::dvec2> outline, std::vector<glm::uvec3>& triangles);
 
     /// Returns whether the last outline was strictly convex.
-    bool wasConvex() const { return wasConvex_; }
+    bool wasConvex() const { return outline_.wasConvex(); }
 
   private:
-    /// Rules for ears, in the order in which they are tried.
-    enum class Rule {
-        strict,    ///< the cut touches the outline only at its ends
-        touching,  ///< the interior of the cut may touch the outline
-        flat,      ///< corners on a straight line
-        convex,    ///< any convex corner; triangles may overlap
-        any,       ///< any corner; triangles may be folded over
-    };
-    struct Corner {
-        glm::dvec2 at;
-        unsigned before, after;
-        unsigned round;  ///< the round in which its neighbours last changed
-        bool present, convex;
-        bool full;  ///< its interior angle is 360 degrees
-    };
+    using Triangles = std::vector<glm::uvec3>;
 
-    void link(std::span<const glm::dvec2> outline);
-    bool playRound(Rule rule, std::vector<glm::uvec3>& triangles);
-    void cut(unsigned v, std::vector<glm::uvec3>& triangles);
-    void remove(unsigned v);
-    bool finish(unsigned v, std::vector<glm::uvec3>& triangles);
-    void cutEmpty(std::vector<glm::uvec3>& triangles);
-    void separate(std::vector<glm::uvec3>& triangles);
-    bool isPinched(unsigned v, unsigned w) const;
-    void split(unsigned v, unsigned w, std::vector<glm::uvec3>& triangles);
-    void classify(unsigned v);
+    void start(std::span<const glm::dvec2> outline);
+    bool playRound(EarRule rule, Triangles& triangles);
+    void cut(unsigned v, Triangles& triangles);
+    bool finish(unsigned v, Triangles& triangles);
+    void cutEmpty(Triangles& triangles);
+    void separate(Triangles& triangles);
+    void split(unsigned v, unsigned w, Triangles& triangles);
     void update(unsigned v);
     void tryAll();
     void tryChanged();
 
-    bool mayCut(unsigned v, Rule rule) const;
-    bool isEar(unsigned v, Rule rule) const;
-    bool isEmpty(unsigned v) const;
-    bool keepsAngles(unsigned v, Rule rule) const;
-    bool blocks(unsigned w, unsigned v, Rule rule) const;
-    void findFullAngles(std::span<const glm::dvec2> outline);
-    void narrow(unsigned at, unsigned v, unsigned to);
-    bool isOutward(unsigned v) const;
-    int side(unsigned a, unsigned b, unsigned p) const;
-
-    std::vector<Corner> corners_;
+    Outline outline_;
+    std::vector<unsigned> rounds_;        ///< for each corner, the round in which its neighbours last changed
     std::vector<unsigned> tried_, next_;  ///< corners to try in this round and in the next one
     std::vector<unsigned> changed_;       ///< corners whose edges have changed
-    PointTree obstacles_;                 ///< corners that are not convex
-    unsigned left_ = 0, round_ = 0;
-    bool wasConvex_ = false, fits_ = true;
+    unsigned round_ = 0;
+    bool fits_ = true;
 };
 
 }  // namespace bilayer::detail

@@ -44,7 +44,7 @@ TEST_CASE("The distance from a multisphere is that of its support function, outs
         const MultisphereHull hull(balls);
         for (int i = 0; i < 20; ++i) {
             const glm::vec3 point = 1.2f * vector();
-            const auto near = hull.nearest(point);
+            const auto near = hull.nearest(point, 0);
             const auto along = [&](const glm::vec3& v) {
                 float least = std::numeric_limits<float>::max();
                 for (const auto& ball : balls) least = std::min(least, glm::dot(v, point - ball.centre) - ball.radius);
