@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Convex bodies in closed form: signed distance, and the features to be tested against a field.
-// Tested by tests/bullet/convex.cpp and tests/collider/shapes.cpp.
+// Tested by tests/bullet/convex.cpp.
 #pragma once
 
 #include <memory>
