@@ -16,7 +16,9 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parents[2]
 LIST = Path(__file__).with_suffix(".txt")
 SKIPPED = 4
-FIRST_LINE = "# Public names of C++, by tests/house/public_names.py --write. See docs/api-policy.md.\n"
+FIRST_LINES = """# SPDX-License-Identifier: Apache-2.0
+# Public names of C++, by tests/house/public_names.py --write. See docs/api-policy.md.
+"""
 
 
 def text(element, tag):
@@ -55,9 +57,9 @@ def main():
         subprocess.run(["doxygen", "-"], input=settings, text=True, cwd=ROOT, check=True, stderr=subprocess.DEVNULL)
         found = sorted(set(names(Path(folder) / "xml")))
     if "--write" in sys.argv:
-        LIST.write_text(FIRST_LINE + "\n".join(found) + "\n")
+        LIST.write_text(FIRST_LINES + "\n".join(found) + "\n")
         return 0
-    listed = LIST.read_text().splitlines()[1:]
+    listed = LIST.read_text().splitlines()[FIRST_LINES.count("\n"):]
     for sign, lines in (("gone", set(listed) - set(found)), ("new", set(found) - set(listed))):
         for line in sorted(lines):
             print(f"{sign}: {line}")
