@@ -21,7 +21,10 @@ for file in /etc/apt/apt.conf.d/*proxy* /etc/apt/apt.conf.d/*registry*; do
 done
 mmdebstrap --variant=minbase --quiet "${options[@]}" bookworm "$root" || skip "mmdebstrap finds no Debian mirror"
 
-mkdir "$root/packages" "$root/user"
+mkdir -p "$root/packages" "$root/user" "$root/source/docs/start" "$root/source/tests"
+cp "$source/run" "$root/source/"
+cp "$source/docs/start/install.md" "$root/source/docs/start/"
+cp -r "$source/tests/docs" "$root/source/tests/"
 cp "$packages"/*.deb "$root/packages/"
 cp -r "$source/tests/package/consumer" "$root/user/"
 cp "$source/tests/package/parent/main.cpp" "$root/user/cube.cpp"
@@ -69,7 +72,13 @@ PYTHON
 
 echo "== removed without a trace"
 apt-get purge -y -qq bilayer libbilayer-dev python3-bilayer >/dev/null 2>&1
-left=$(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*')
+left=$(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*' -not -path '/source/*')
 [[ -z $left ]] || { echo "debian.sh: left behind: $left"; exit 1; }
+
+echo "== the commands of docs/start/install.md for packages"
+install sudo
+echo 'APT::Get::Assume-Yes "true";' >/etc/apt/apt.conf.d/yes
+mkdir /scratch
+python3 /source/tests/docs/run_page.py --from "As Debian packages" --packages /packages /source /nowhere /scratch docs/start/install.md
 IN_ROOT
 echo "the packages work in a clean Debian 12"
