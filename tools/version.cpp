@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The version of the program, and of what it was built with.
 // Tested by tests/tools/usage.cpp through run().
-#include <LinearMath/btScalar.h>
 #include <Imath/ImathConfig.h>
+#include <LinearMath/btScalar.h>
 #include <assimp/version.h>
 #include <blosc.h>
 #include <fmt/format.h>
@@ -44,7 +44,8 @@ std::string boostVersion() {
 
 }  // namespace
 
-// Versions of libraries as their headers state them, or as CMake found them where headers do not (tools/CMakeLists.txt).
+// Versions of libraries as their headers state them, or as CMake found them where headers do not
+// (tools/CMakeLists.txt).
 std::string versions() {
     return fmt::format(
         "bilayer {}\n"
