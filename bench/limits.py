@@ -158,8 +158,38 @@ def cases(mesh):
         yield "the same as a liquid", ["seed", mesh[name], "--resolution", "256"]
 
 
+def polygon(path, x, y):
+    """One flat face with these corners, as OBJ."""
+    corners = "".join(f"v {a:.6f} {b:.6f} 0\n" for a, b in zip(x, y))
+    path.write_text(corners + "f " + " ".join(map(str, range(1, len(x) + 1))) + "\n")
+    return str(path)
+
+
+def zero_bytes(path):
+    with open(path, "wb") as file:
+        file.truncate(1 << 30)
+    return str(path)
+
+
+def hostile(folder):
+    """Files that were made to cost much."""
+    random = np.random.default_rng(1)
+    at = lambda angle, radius: (radius * np.cos(angle), radius * np.sin(angle))
+    yield "1 GiB of zero bytes, as .obj", ["inspect", zero_bytes(folder / "zero.obj")]
+    yield "1 GiB of zero bytes, as .vdb", ["info", zero_bytes(folder / "zero.vdb")]
+    star = polygon(folder / "star.obj", *at(np.linspace(0, 2 * np.pi, 20_000, endpoint=False), random.uniform(0.1, 1, 20_000)))
+    yield "one polygon of 20,000 corners in a star", ["inspect", star]
+    out = np.sqrt(np.linspace(1, 1000, 100_000)) * np.pi  # the angles of a spiral, which returns next to itself
+    spiral = at(np.concatenate([out, out[::-1]]), np.concatenate([out, out[::-1] + 1]))
+    yield "one polygon of 200,000 corners in a spiral", ["inspect", polygon(folder / "spiral.obj", *spiral)]
+    crossing = polygon(folder / "crossing.obj", *random.random((2, 10_000)))
+    yield "one polygon of 10,000 random corners, which crosses itself everywhere", ["build", crossing, "--resolution", "20"]
+    yield "the same", ["inspect", crossing]
+    yield "the same of 40,000 corners", ["inspect", polygon(folder / "larger.obj", *random.random((2, 40_000)))]
+
+
 def measure(program, words, folder):
-    if words[0] != "inspect":
+    if words[0] not in ("inspect", "info"):
         words = [*words, "-o", str(folder / ("tiles" if "--tiles" in words else "out.vdb"))]
     begin = time.monotonic()
     limit = lambda: resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS))
@@ -168,7 +198,8 @@ def measure(program, words, folder):
     _, status, usage = os.wait4(process.pid, 0)
     seconds = time.monotonic() - begin
     process.returncode = os.waitstatus_to_exitcode(status)
-    return process.returncode, seconds, usage.ru_maxrss / 1024, text.replace(f"{folder}/", "").strip().split("\n")[-1]
+    processor = usage.ru_utime + usage.ru_stime
+    return process.returncode, seconds, processor, usage.ru_maxrss / 1024, text.replace(f"{folder}/", "").strip().split("\n")[-1]
 
 
 def measure_growth(program, folder):
@@ -182,20 +213,22 @@ def measure_growth(program, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("program", help="bilayer")
-    parser.add_argument("chosen", nargs="*", help="measure only rows that have one of these words; growth: instead, how time grows")
+    parser.add_argument("chosen", nargs="*", help="measure only rows that have one of these words; growth: instead, how time grows; "
+                        "hostile: instead, files that were made to cost much")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if "growth" in arguments.chosen:
             return measure_growth(arguments.program, folder)
-        mesh = meshes(folder)
-        print("| input | command | status | time [s] | memory [MiB] | last line |\n|---|---|---|---|---|---|")
-        for title, words in cases(mesh):
+        rows = hostile(folder) if "hostile" in arguments.chosen else cases(meshes(folder))
+        print("| input | command | status | time [s] | of processors [s] | memory [MiB] | last line |\n|---|---|---|---|---|---|---|")
+        for title, words in rows:
             command = " ".join(words).replace(f"{name}/", "")
-            if arguments.chosen and not any(part in title + command for part in arguments.chosen):
+            wanted = [word for word in arguments.chosen if word != "hostile"]
+            if wanted and not any(part in title + command for part in wanted):
                 continue
-            status, seconds, memory, line = measure(arguments.program, words, folder)
-            print(f"| {title} | `{command}` | {status} | {seconds:.1f} | {memory:.0f} | {line} |", flush=True)
+            status, seconds, processor, memory, line = measure(arguments.program, words, folder)
+            print(f"| {title} | `{command}` | {status} | {seconds:.1f} | {processor:.1f} | {memory:.0f} | {line} |", flush=True)
 
 
 if __name__ == "__main__":

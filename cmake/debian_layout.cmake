@@ -1,11 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 # Run by CPack before it makes packages: moves what is installed where Debian's programs look for it, and adds what each
-# package documents.
+# package documents: the licence of bilayer, and the notices of the libraries of which code is compiled in.
+file(READ ${CPACK_RESOURCE_FILE_LICENSE} licence)
+string(CONCAT copyright "bilayer is under the Apache License 2.0:\n\n${licence}\n"
+  "Code of the headers of the following Debian packages is compiled in. Their notices, as these packages state them:\n")
+foreach(package IN LISTS CPACK_BILAYER_COMPILED_IN)
+  set(file /usr/share/doc/${package}/copyright)
+  if(NOT EXISTS ${file})
+    message(FATAL_ERROR "the notice of ${package} is missing: there is no ${file}")
+  endif()
+  file(READ ${file} notice)
+  string(REPEAT "=" 80 line)
+  string(APPEND copyright "\n${line}\n${package}\n${line}\n\n${notice}")
+endforeach()
+
 foreach(group IN ITEMS program development python)
   string(TOUPPER ${group} upper)
   set(folder ${CPACK_TEMPORARY_INSTALL_DIRECTORY}/${group}/usr)
   if(EXISTS ${folder})
-    configure_file(${CPACK_RESOURCE_FILE_LICENSE} ${folder}/share/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME}/copyright COPYONLY)
+    file(WRITE ${folder}/share/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME}/copyright "${copyright}")
   endif()
 endforeach()
 

@@ -52,6 +52,11 @@ set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
+# Debian packages whose headers have code that is compiled in. The file `copyright` of our packages has their notices.
+set(BILAYER_COMPILED_IN
+  libopenvdb-dev libnanovdb-dev libtbb-dev libhwy-dev libglm-dev libfmt-dev libimath-dev libassimp-dev libbullet-dev libtinygltf-dev
+  nlohmann-json3-dev libfast-float-dev opencl-c-headers opencl-clhpp-headers libcli11-dev pybind11-dev)
+set(CPACK_BILAYER_COMPILED_IN ${BILAYER_COMPILED_IN})  # for the script, which sees only variables of CPack
 set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/cmake/debian_layout.cmake)
 
 set(CPACK_DEBIAN_PROGRAM_DESCRIPTION

@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""usage: contact_pictures.py: draws docs/patch.svg and docs/sweep.svg, of contacts and a time of impact that the module finds.
+"""usage: contact_pictures.py: draws pictures of contacts: docs/patch.svg, docs/sweep.svg, docs/shapes.svg and docs/blocks_of_a_body.svg
+of what the Python module finds, docs/smooth_ground.svg of runs of ./run demo terrain.
 
-Needs ./run python and Debian's package glmark2-data; run it with PYTHONPATH=build/release/python."""
+Needs ./run python, ./run build demo_terrain and Debian's package glmark2-data; run it with PYTHONPATH=build/release/python."""
 
+import csv
+import subprocess
+import tempfile
 from pathlib import Path
 
 import bilayer
@@ -60,6 +64,120 @@ def sweep():
         label(215, 255, f"first touch, at {impact.fraction:.2f} of the step", RED), label(460, 255, "without it: the step's end")])
 
 
+def hill():
+    """A body with a curved top: the area under a curve, extruded along z."""
+    x = np.linspace(-4, 4, 161)
+    top = 0.45 * np.sin(1.4 * x) - 0.25 * np.cos(0.6 * x)
+    outline = np.concatenate([np.stack([x, top], 1), [[4, -1.2], [-4, -1.2]]])
+    count, half = len(x), 0.6
+    vertices = np.concatenate([np.column_stack([outline, np.full(len(outline), z)]) for z in (-half, half)])
+    n = len(outline)
+    side = [(i, (i + 1) % n) for i in range(n)]
+    faces = [f for a, b in side for f in ((a, a + n, b), (b, a + n, b + n))]
+    bottom = [(count + 1) if i < count // 2 else count for i in range(count - 1)]  # a fan from either lower corner
+    fans = [(i, i + 1, c) for i, c in enumerate(bottom)] + [(count // 2, count, count + 1)]
+    faces += [(a, b, c) for a, b, c in fans] + [(a + n, c + n, b + n) for a, b, c in fans]
+    return bilayer.Mesh(vertices.astype(np.float32), np.array(faces, np.int32)), outline
+
+
+def shapes():
+    """Shapes that penetrate a field by a little, from the side, with their contacts and normals."""
+    mesh, outline = hill()
+    assert bilayer.inspect(mesh).closed and bilayer.inspect(mesh).oriented
+    ground = bilayer.Collider(mesh, bilayer.build(mesh, voxel_size=0.04, half_width_voxels=6))
+    kinds = [("sphere", bilayer.Shape.sphere(0.4), -3.1, 0, "M-0.4 0a.4 .4 0 1 0 .8 0a.4 .4 0 1 0 -.8 0"),
+             ("capsule", bilayer.Shape.capsule(0.25, 0.4), -1.6, 1.2, "M-.25 -.4v.8a.25 .25 0 0 0 .5 0v-.8a.25 .25 0 0 0 -.5 0"),
+             ("box", bilayer.Shape.box((0.45, 0.25, 0.4)), -0.1, 0.15, "M-.45 -.25h.9v.5h-.9z"),
+             ("cylinder", bilayer.Shape.cylinder(0.3, 0.4), 1.5, 0.1, "M-.3 -.4h.6v.8h-.6z"),
+             ("cone", bilayer.Shape.cone(0.4, 0.4), 3.0, 2.2, "M-.4 -.4h.8l-.4 .8z")]
+    drawn = ['<path d="M' + " L".join(f"{x:.3f} {y:.3f}" for x, y in outline) + f'Z" fill="{GROUND}" stroke="{DARK}" stroke-width=".02"/>']
+    marks, labels = [], []
+    for name, shape, x, angle, path in kinds:
+        turned = (np.cos(angle / 2), 0, 0, np.sin(angle / 2))
+        gap = 1.0
+        height = 2.5
+        while gap > -0.02:  # lowered until it penetrates by half a voxel
+            height -= max(gap, 0) + 0.005
+            gap = bilayer.distance(shape, bilayer.Pose((x, height, 0), turned), ground, None).distance
+        found = bilayer.collide(shape, bilayer.Pose((x, height, 0), turned), ground, None, margin=0.04)
+        drawn.append(f'<path d="{path}" transform="translate({x} {height:.3f}) rotate({np.degrees(angle):.1f})" fill="{BODY}" '
+                     f'fill-opacity=".8" stroke="#b5651d" stroke-width=".02"/>')
+        for (px, py, _), (nx, ny, _) in zip(found.position, found.normal):
+            marks.append(f'<path d="M{px:.3f} {py:.3f}l{0.3 * nx:.3f} {0.3 * ny:.3f}" stroke="{RED}" stroke-width=".015"/>'
+                         f'<circle cx="{px:.3f}" cy="{py:.3f}" r=".03" fill="{RED}"/>')
+        labels.append(label(340 + 80 * x - 4 * len(name), 30, name) + label(340 + 80 * x - 4 * len(name), 48, f"{len(found)} contacts", RED))
+    svg("shapes.svg", 680, 300, ['<g transform="translate(340 195) scale(80 -80)">', *drawn, *marks, "</g>", *labels])
+
+
+def blocks_of_a_body():
+    """A cut through a bunny on a floor: the blocks of its field, its surface, and its contacts with the floor and with a ball."""
+    mesh = bilayer.read_mesh("/usr/share/glmark2/models/bunny.obj")
+    level_set = bilayer.build(mesh, resolution=64)
+    bunny, spacing = bilayer.Collider(mesh, level_set), level_set.voxel_size
+    height = -mesh.vertices[:, 1].min() - 0.3 * spacing
+    radius, pose = 0.25, bilayer.Pose((0, height, 0))
+    ball, cut = np.array([0.55, 2, 0]), 0.0
+    for _ in range(20):  # let down on the back, and moved along z to where it touches: the cut is there
+        ball[1:] = 2, cut
+        while (gap := bilayer.distance(bilayer.Shape.sphere(radius), bilayer.Pose(ball), bunny, pose)).distance > -0.2 * spacing:
+            ball[1] -= max(gap.distance, 0) + 0.05 * spacing
+        cut = float(gap.position_b[2])
+
+    def at(x, y):
+        return 300 + 170 * x, 400 - 170 * y
+
+    blocks = np.unique(np.floor_divide(level_set.sparse().coordinates, 8), axis=0)
+    middle = int(np.floor((cut / spacing + 0.5) / 8))
+    drawn = [f'<rect x="0" y="400" width="600" height="40" fill="{GROUND}"/>']
+    for i, j, _ in blocks[blocks[:, 2] == middle]:
+        x, y = at((8 * i - 0.5) * spacing, (8 * j + 7.5) * spacing + height)
+        drawn.append(f'<rect x="{x:.1f}" y="{y:.1f}" width="{170 * 8 * spacing:.1f}" height="{170 * 8 * spacing:.1f}" fill="none" stroke="{GREY}"/>')
+    for a, b, c in mesh.vertices[mesh.faces]:  # where triangles meet the plane of the cut
+        ends = [p + (q - p) * (cut - p[2]) / (q[2] - p[2]) for p, q in ((a, b), (b, c), (c, a)) if (p[2] < cut) != (q[2] < cut)]
+        if len(ends) == 2:
+            (x0, y0), (x1, y1) = (at(x, y + height) for x, y, _ in ends)
+            drawn.append(f'<path d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}" stroke="{DARK}" stroke-width="1.5"/>')
+    x, y = at(ball[0], ball[1])
+    drawn.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{170 * radius:.1f}" fill="{BODY}" fill-opacity=".7" stroke="#b5651d"/>')
+    count = 0
+    for other, there in ((bilayer.Shape.plane((0, 1, 0), 0), None), (bilayer.Shape.sphere(radius), bilayer.Pose(ball))):
+        found = bilayer.collide(bunny, pose, other, there, margin=0)
+        count += len(found)
+        for (px, py, _), (nx, ny, _) in zip(found.position, found.normal):
+            x, y = at(px, py)
+            drawn.append(f'<path d="M{x:.1f} {y:.1f}l{30 * nx:.1f} {-30 * ny:.1f}" stroke="{RED}" stroke-width="1.2"/>'
+                         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5" fill="{RED}"/>')
+    svg("blocks_of_a_body.svg", 600, 440, drawn + [label(20, 30, "the blocks of the field, in a cut"),
+        label(20, 50, f"{count} contacts with a floor and a ball, and their normals", RED)])
+
+
+def energies(*options):
+    """Times, and the energy of six bodies that slide over waves of coarse triangles, as a part of that at the start."""
+    program = DOCS.parent / "build" / "release" / "demo_terrain"
+    with tempfile.TemporaryDirectory() as folder:
+        command = [program, "--height", "0.1", "--cell", "0.6", "--steps", "60", "--out", folder, *options]
+        subprocess.run(command, stdout=subprocess.DEVNULL)  # the scene misses its criteria without smooth ground
+        with open(Path(folder) / "terrain.csv") as file:
+            rows = [(float(row["time_s"]), float(row["kinetic_J"]) + float(row["potential_J"])) for row in csv.DictReader(file)]
+    settled = [row for row in rows if row[0] >= 0.25]
+    return [(time, energy / settled[0][1]) for time, energy in settled]
+
+
+def smooth_ground():
+    """The energy of bodies that slide over waves without friction, with and without smooth ground."""
+    left, bottom, wide, tall = 70, 240, 500, 200
+    shapes = [f'<path d="M{left} {bottom - tall * share:.0f}h{wide}" stroke="{GROUND}"/>' for share in (0.25, 0.5, 0.75, 1)]
+    shapes += [label(20, bottom + 5 - tall * share, f"{100 * share:.0f} %") for share in (0, 0.5, 1)]
+    shapes += [f'<path d="M{left} {bottom}h{wide}" stroke="{DARK}"/>', label(left + wide - 20, bottom + 22, "3 s"), label(left, bottom + 22, "0")]
+    for options, colour, text, at in (([], DARK, "with smoothGround", 0.9), (["--no-smooth-ground"], RED, "without", 0.68)):
+        curve = [f"{left + wide * time / 3.25:.1f} {bottom - tall * energy:.1f}" for time, energy in energies(*options)]
+        shapes += [f'<path d="M{"L".join(curve)}" fill="none" stroke="{colour}" stroke-width="2"/>', label(400, bottom - tall * at, text, colour)]
+    svg("smooth_ground.svg", 600, 280, shapes + [label(left, 22, "energy of six bodies that slide over waves of triangles without friction")])
+
+
 if __name__ == "__main__":
     patch()
     sweep()
+    shapes()
+    blocks_of_a_body()
+    smooth_ground()

@@ -169,7 +169,8 @@ int ghostsIn(btDispatcher& dispatcher, const btCollisionObject& ground, const Wa
 Outcome terrain(const TerrainOptions& options) {
     Stage stage("Bodies slide over waves", {.stepsPerSecond = options.stepsPerSecond,
                                             .stepsPerFrame = std::max(1, int(options.stepsPerSecond / 60)),
-                                            .framesPerMeasuring = 4});
+                                            .framesPerMeasuring = 4,
+                                            .smoothGround = options.smoothGround});
     const Waves waves({options.height, options.cell, options.heightField});
     const btRigidBody& ground = stage.add(makeThing(waves.solid(), waves.shape(), groundVoxel),
                                           {.friction = frictionOf(options)}, {}, groundLook);

@@ -12,6 +12,7 @@ struct TerrainOptions {
     float cell = 0.25f;        ///< edge of the squares of two triangles each that form the ground [m]
     bool heightField = false;  ///< the ground is a btHeightfieldTerrainShape; otherwise a btBvhTriangleMeshShape
     bool rolls = false;        ///< only the ball and the capsule, which roll with friction; otherwise six bodies slide
+    bool smoothGround = true;  ///< as in bullet::ExtensionOptions
     float speed = 2;           ///< initial speed [m/s]
     float seconds = 3;
     float stepsPerSecond = 240;

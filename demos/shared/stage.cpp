@@ -62,7 +62,8 @@ std::shared_ptr<const Thing> makeThing(Mesh mesh, std::shared_ptr<btCollisionSha
     return std::make_shared<Thing>(Thing{std::move(mesh), std::move(field), std::move(shape), std::move(specimen)});
 }
 
-Stage::Stage(std::string title, const StageOptions& options) : options_(options), outcome_{Recording(title)} {
+Stage::Stage(std::string title, const StageOptions& options)
+    : options_(options), outcome_{Recording(title)}, world_({.smoothGround = options.smoothGround}) {
     outcome_.title = std::move(title);
     outcome_.stepsPerSecond = options.stepsPerSecond;
     outcome_.fingerprint = fnvStart;

@@ -43,6 +43,7 @@ struct StageOptions {
     float stepsPerSecond = 240;
     int stepsPerFrame = 4;       ///< steps per recorded frame
     int framesPerMeasuring = 1;  ///< penetrations are measured once per this count of frames, and in the last frame
+    bool smoothGround = true;    ///< as in bullet::ExtensionOptions
 };
 
 class Stage {

@@ -27,7 +27,7 @@ double kineticEnergyOf(const btRigidBody& body) {
     return energy;
 }
 
-World::World() {
+World::World(const bullet::ExtensionOptions& extensions) : extensions_(world_, extensions) {
     world_.setGravity({0, 0, -gravity});
     // with Bullet's single friction direction, a resting stack of rings drifts sideways until it falls
     world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;

@@ -37,7 +37,7 @@ double kineticEnergyOf(const btRigidBody& body);
 /// Bodies under gravity along -z, in the order of add().
 class World {
   public:
-    World();
+    explicit World(const bullet::ExtensionOptions& extensions = {});
     ~World();
 
     /// Adds a body at the pose of its mesh: the mesh of the collider for a bullet::Shape, and the shape's own
@@ -72,7 +72,7 @@ class World {
     btDbvtBroadphase broadphase_;
     btSequentialImpulseConstraintSolver solver_;
     btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
-    bullet::WorldExtensions extensions_{world_};
+    bullet::WorldExtensions extensions_;
     std::vector<Body> bodies_;
 };
 

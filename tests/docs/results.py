@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: results.py SOURCE: checks that measured tables stand in docs/results/ and docs/paper.md alone, that each page there
-says how its figures were measured, that docs/results.md and docs/README.md link all of these pages, and that other pages quote
+says how its figures were measured and with which bilayer, that nothing is "not recorded", that docs/results.md and docs/README.md link all of these pages, and that other pages quote
 times and ratios with a link to the results that have them."""
 
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 CONDITIONS = ["command", "machine", "date", "versions", "compared with"]
-DATE = re.compile(r"\d{4}-\d\d-\d\d|not recorded")
+DATE = re.compile(r"\d{4}-\d\d-\d\d")
+VERSION = re.compile(r"\bbilayer (?:\d+\.\d+\.\d+|([0-9a-f]{8}))\b")  # or a revision
+UNKNOWN = re.compile(r"not recorded|not known|unknown|which, is not", re.I)  # of a condition
 TABLE = re.compile(r"^(\|[^\n]*)\n\|[ :|-]+\|\n((?:\|[^\n]*\n)*)", re.M)
 FIGURE = re.compile(r"\b([\d.,]*\d)(?: to ([\d.,]*\d))? (?:ns|us|ms|(?:times|frames) (?:as (?:fast|long)|a second))\b")
 CELL = re.compile(r"[\d.,]+(?: to [\d.,]+)? (?:ns|us|ms|s|KB|MB|MiB|GiB)")  # a whole one of a table
@@ -32,8 +35,21 @@ def faults_of_results(name, page):
     for rows in conditions:
         if [row[0] for row in rows] != CONDITIONS:
             yield f"{name}: a table of conditions has the rows {[row[0] for row in rows]} instead of {CONDITIONS}"
-        elif not DATE.search(rows[2][1]):
-            yield f"{name}: the date '{rows[2][1]}' is neither YYYY-MM-DD nor 'not recorded'"
+            continue
+        if not DATE.search(rows[2][1]):
+            yield f"{name}: the date '{rows[2][1]}' is not YYYY-MM-DD"
+        if not VERSION.search(rows[3][1]):
+            yield f"{name}: the versions '{rows[3][1]}' name neither a version nor a revision of bilayer"
+        yield from (f"{name}: the {row} is '{value}'" for row, value in rows if UNKNOWN.search(value) or not value)
+
+
+def faults_of_revisions(root):
+    """Revisions that the history does not have. A copy without history is not asked."""
+    named = {rev for path in (root / "docs" / "results").glob("*.md") for rev in VERSION.findall(path.read_text()) if rev}
+    shallow = subprocess.run(["git", "rev-parse", "--is-shallow-repository"], cwd=root, capture_output=True, text=True).stdout.strip()
+    for revision in sorted(named if shallow == "false" else ()):
+        if subprocess.run(["git", "cat-file", "-e", f"{revision}^{{commit}}"], cwd=root, stderr=subprocess.DEVNULL).returncode:
+            yield f"docs/results: there is no revision {revision}"
 
 
 def is_results(root, path):
@@ -86,7 +102,10 @@ def faults(root):
         for index in ("results.md", "README.md"):
             if f"(results/{path.name}" not in (docs / index).read_text():
                 yield f"docs/{index} does not link results/{path.name}"
+    yield from faults_of_revisions(root)
     for path in [*sorted(root.glob("*.md")), *sorted(docs.rglob("*.md"))]:
+        if "not recorded" in path.read_text():
+            yield f"{path.relative_to(root)}: something is 'not recorded'"
         if not is_results(root, path):
             yield from faults_of_tables(root, path)
             yield from faults_of_quotes(root, path)

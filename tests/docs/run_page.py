@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""usage: run_page.py [--write] [--given FILE] SOURCE BUILD SCRATCH PAGE
+"""usage: run_page.py [--write] [--given FILE] [--from HEADING] [--packages DIR] SOURCE BUILD SCRATCH PAGE
 
 Does what a page shows, in its order, in an empty folder: writes its files, runs its commands and its Python, and compares
 outputs with those on the page. --write puts the outputs of this run into the page instead. Exit status 4: something that
@@ -7,6 +7,9 @@ the page needs is not installed.
 
 Commands run as on a reader's machine, except for these, which tests/docs/stand-ins replaces: `./run`, which has built
 everything; `sudo apt install`, which only looks; `sudo cmake --install`, which installs into SCRATCH.
+
+With --packages, in a clean root (tests/package/debian.sh), all commands are real but `./run`: its packages are in DIR.
+--from leaves out what stands before a heading.
 """
 
 import argparse
@@ -27,6 +30,8 @@ def parse():
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("--write", action="store_true")
     parser.add_argument("--given", action="append", default=[], type=Path)
+    parser.add_argument("--from", dest="heading")
+    parser.add_argument("--packages", type=Path)
     for name in ("source", "build", "scratch"):
         parser.add_argument(name, type=lambda text: Path(text).resolve())
     parser.add_argument("page")
@@ -60,6 +65,8 @@ def script(page, folder):
 
 def environment(options):
     """Finds what the installation page has installed, as /usr/local is found without any setting."""
+    if options.packages:
+        return dict(os.environ, HOME=str(options.scratch), BILAYER_SOURCE=str(options.source))
     installed = options.scratch / "installed" / "usr" / "local"
     python = next(installed.glob("lib/python3*/*-packages"), None)
     stand_ins = options.source / "tests" / "docs" / "stand-ins"
@@ -92,6 +99,8 @@ def main():
     folder.mkdir(parents=True)
     (folder / "build").mkdir()
     (folder / "build" / "release").symlink_to(options.build)
+    if options.packages:
+        (folder / "build" / "packages").symlink_to(options.packages)
     (folder / "run").symlink_to(options.source / "tests" / "docs" / "stand-ins" / "run")
     for file in options.given:
         if not file.exists():
@@ -99,7 +108,8 @@ def main():
             return SKIPPED
         shutil.copy(file, folder)
 
-    text, expected = script(page, folder)
+    begin = page.index(f"## {options.heading}\n") if options.heading else 0
+    text, expected = script(page[begin:], folder)
     result = subprocess.run(["bash", "-c", text], cwd=folder, env=environment(options), text=True, timeout=TIME_LIMIT,
                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     if result.returncode:

@@ -21,10 +21,18 @@ for file in /etc/apt/apt.conf.d/*proxy* /etc/apt/apt.conf.d/*registry*; do
 done
 mmdebstrap --variant=minbase --quiet "${options[@]}" bookworm "$root" || skip "mmdebstrap finds no Debian mirror"
 
-mkdir "$root/packages" "$root/user"
+mkdir -p "$root/packages" "$root/user" "$root/source/docs/start" "$root/source/tests"
+cp "$source/run" "$root/source/"
+cp "$source/docs/start/install.md" "$root/source/docs/start/"
+cp -r "$source/tests/docs" "$root/source/tests/"
 cp "$packages"/*.deb "$root/packages/"
 cp -r "$source/tests/package/consumer" "$root/user/"
 cp "$source/tests/package/parent/main.cpp" "$root/user/cube.cpp"
+# the notices that the packages must have: of what docs/third-party.md says is compiled in
+mkdir "$root/notices"
+sed -n '/^## Compiled in/,/^## Used/s/^|[^|]*|\([^|]*\)|.*/\1/p' "$source/docs/third-party.md" | grep -o '`[^`]*`' | tr -d '`' |
+  while read -r package; do cp -L "/usr/share/doc/$package/copyright" "$root/notices/$package"; done
+(($(ls "$root/notices" | wc -l) >= 15)) || { echo "debian.sh: docs/third-party.md lists too few packages as compiled in"; exit 1; }
 cp -L /etc/resolv.conf /etc/hosts "$root/etc/"
 # nothing of this machine's environment but its proxies
 chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 \
@@ -53,9 +61,24 @@ build/consumer
 g++ -std=c++20 cube.cpp $(pkg-config --cflags --libs bilayer-sdf) -o cube
 ./cube
 
+echo "== the licence and the notices of what is compiled in"
+python3 - <<'PYTHON'
+from pathlib import Path
+for package in ("bilayer", "libbilayer-dev", "python3-bilayer"):
+    text = Path(f"/usr/share/doc/{package}/copyright").read_text()
+    missing = [notice.name for notice in sorted(Path("/notices").iterdir()) if notice.read_text() not in text]
+    assert "Apache License" in text and not missing, f"the copyright of {package} lacks the notices of {missing}"
+PYTHON
+
 echo "== removed without a trace"
 apt-get purge -y -qq bilayer libbilayer-dev python3-bilayer >/dev/null 2>&1
-left=$(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*')
+left=$(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*' -not -path '/source/*')
 [[ -z $left ]] || { echo "debian.sh: left behind: $left"; exit 1; }
+
+echo "== the commands of docs/start/install.md for packages"
+install sudo
+echo 'APT::Get::Assume-Yes "true";' >/etc/apt/apt.conf.d/yes
+mkdir /scratch
+python3 /source/tests/docs/run_page.py --from "As Debian packages" --packages /packages /source /nowhere /scratch docs/start/install.md
 IN_ROOT
 echo "the packages work in a clean Debian 12"

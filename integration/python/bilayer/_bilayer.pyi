@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 from typing import Any, Dict, Iterable, List, NoReturn, Optional, SupportsIndex, Union, overload
 
 import numpy as np

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional, Type, TypeVar
 
@@ -17,6 +19,8 @@ Doubles = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 Result = TypeVar("Result")
+_NAMES = r"\w+(?:, \w+)*: "
+_FIELDS = re.compile(rf"^({_NAMES})(.*(?:\n(?!{_NAMES}).+)*)", re.M)  # of the docstring of a class: names, and the text about them
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -25,8 +29,9 @@ def _same(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
-def _comparable(result: Type[Result]) -> Type[Result]:
-    """Lets named tuples compare field by field: as tuples, they would ask arrays for a truth value."""
+def _result(result: Type[Result]) -> Type[Result]:
+    """Lets named tuples compare field by field, where tuples would ask arrays for a truth value. Each field gets what the
+    docstring of the class says about it as a docstring of its own."""
 
     def equal(self: Any, other: Any) -> bool:
         if type(other) is not type(self):
@@ -35,10 +40,13 @@ def _comparable(result: Type[Result]) -> Type[Result]:
 
     for name, value in (("__eq__", equal), ("__ne__", object.__ne__), ("__hash__", None)):
         setattr(result, name, value)
+    for names, text in _FIELDS.findall(inspect.cleandoc(result.__doc__ or "")):
+        for name in set(re.findall(r"\w+", names)) & set(getattr(result, "_fields")):
+            getattr(result, name).__doc__ = " ".join(text.split())
     return result
 
 
-@_comparable
+@_result
 class Samples(NamedTuple):
     """Field.sample(): arrays of the points' leading shape (...). A tuple, so that it can be unpacked.
 
@@ -58,7 +66,7 @@ class Samples(NamedTuple):
     in_band: Bools
 
 
-@_comparable
+@_result
 class ClosestPoints(NamedTuple):
     """Field.closest(): arrays of the points' leading shape (...). A tuple, so that it can be unpacked.
 
@@ -86,12 +94,12 @@ class ClosestPoints(NamedTuple):
     found: Bools
 
 
-@_comparable
+@_result
 class Hits(NamedTuple):
     """Field.raycast(), sphere_cast() and segment(): arrays of the rays' leading shape (...). A tuple, so that it can be
     unpacked: its length is that of the tuple, not the number of rays.
 
-    hit: bool (...).
+    hit: bool (...), whether the ray or sphere meets the solid.
     distance: float32 (...), a length in the mesh's unit; 0 for a start inside, inf without a hit.
     position: float32 (..., 3), on the surface, relative to Field.origin; the start itself for a start inside;
     nan without a hit.
@@ -160,7 +168,7 @@ class Contacts(_Fields):
         return len(self.distance)
 
 
-@_comparable
+@_result
 class BodyDistance(NamedTuple):
     """distance(): the closest points of two bodies, in the world of the poses.
 
@@ -189,7 +197,7 @@ class BodyDistance(NamedTuple):
     triangle_b: int
 
 
-@_comparable
+@_result
 class Impact(NamedTuple):
     """time_of_impact(): when two moving bodies touch.
 
@@ -213,11 +221,11 @@ class Impact(NamedTuple):
     distance: BodyDistance
 
 
-@_comparable
+@_result
 class MassProperties(NamedTuple):
     """mass_properties() and Collider.mass, for density 1.
 
-    volume: float.
+    volume: float, in the mesh's unit cubed.
     centre: float32 (3,), the centre of mass, in the coordinates of Mesh.vertices.
     inertia: float32 (3, 3), the inertia tensor about the centre of mass.
     principal_inertia: float32 (3,), ascending.
@@ -235,7 +243,7 @@ class MassProperties(NamedTuple):
     principal_axes: Floats
 
 
-@_comparable
+@_result
 class Dense(NamedTuple):
     """LevelSet.to_numpy(): values[i, j, k] is the distance at origin + spacing * (i, j, k).
 
@@ -254,7 +262,7 @@ class Dense(NamedTuple):
     spacing: float
 
 
-@_comparable
+@_result
 class Sparse(NamedTuple):
     """LevelSet.sparse(): values[n] is the distance at origin + spacing * coordinates[n].
 
@@ -277,11 +285,11 @@ class Sparse(NamedTuple):
     spacing: float
 
 
-@_comparable
+@_result
 class Seeded(NamedTuple):
     """seed(): the new liquid, and how far distances were changed to make it a level set.
 
-    liquid: LevelSet.
+    liquid: LevelSet, with the body added or taken away.
     max_change_voxels: float, the largest change of a distance, near creases, in voxels.
     where: float64 (3,), the centre of that voxel, relative to LevelSet.origin.
     changed_voxels: int, voxels that changed by more than 0.1 voxels.

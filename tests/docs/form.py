@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""usage: form.py SOURCE: checks the form of pages: items of lists of at most three lines, paragraphs of at most six, and a picture
+on each page that explains how contacts are found, kept, reduced and bounced."""
+
+import re
+import sys
+from pathlib import Path
+
+CODE = re.compile(r"^```.*?^```$|^<!--.*?-->$", re.M | re.S)
+ITEM = re.compile(r"\s*(?:[-*]|\d+\.) ")
+MAX_ITEM, MAX_PARAGRAPH = 3, 6  # [lines]
+WITH_PICTURE = ["finding", "motion", "solver", "shapes", "extensions", "bullet-world"]
+PICTURE = re.compile(r"!\[[^\]]+\]\(([\w./-]+)\)")
+
+
+def parts(page):
+    """The first line number and the lines of each paragraph and item."""
+    part = []
+    for number, line in enumerate([*CODE.sub(lambda code: "\n" * code.group().count("\n"), page).splitlines(), ""], 1):
+        if part and (not line.strip() or ITEM.match(line) or line.startswith(("#", "|"))):
+            yield number - len(part), part
+            part = []
+        if line.strip() and not line.startswith(("#", "|")):
+            part.append(line)
+
+
+def faults(root):
+    for path in [*sorted(root.glob("*.md")), *sorted((root / "docs").rglob("*.md"))]:
+        if path.name == "CHANGELOG.md" or path == root / "docs" / "paper.md":
+            continue
+        for number, lines in parts(path.read_text()):
+            limit = MAX_ITEM if ITEM.match(lines[0]) else MAX_PARAGRAPH
+            if len(lines) > limit:
+                yield f"{path.relative_to(root)}:{number}: {len(lines)} lines, {limit} at most: {lines[0].strip()[:60]}"
+    for name in WITH_PICTURE:
+        page = root / "docs" / "contacts" / f"{name}.md"
+        pictures = PICTURE.findall(page.read_text())
+        if not any((page.parent / picture).is_file() for picture in pictures):
+            yield f"{page.relative_to(root)} has no picture"
+
+
+if __name__ == "__main__":
+    found = list(faults(Path(sys.argv[1])))
+    sys.exit("\n".join(found) if found else 0)
