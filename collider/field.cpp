@@ -2,6 +2,7 @@
 // Construction and properties of fields. Queries are in separate files.
 #include <bilayer/collider/field.h>
 
+#include <limits>
 #include <utility>
 
 #include "collider/field/field_data.h"
@@ -19,6 +20,16 @@ FieldData::FieldData(const LevelSet& levelSet, Storage storage)
       signedByNormals(levelSet.sign() == nameOf(Sign::normals)),
       signedByWinding(signedByNormals || levelSet.sign() == nameOf(Sign::winding)),
       sampleError(levelSet.errorBound() + (storage == Storage::fixed16 ? step : 0)) {
+    fillLanes();
+}
+
+FieldData::FieldData(FieldLayout layout)
+    : FieldLayout(std::move(layout)),
+      kernels(sampleKernels(storage)),
+      coarse(clearance()),
+      signedByNormals(false),
+      signedByWinding(false),
+      sampleError(std::numeric_limits<float>::infinity()) {
     fillLanes();
 }
 

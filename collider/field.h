@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sampled distance fields: distance, gradient, closest point, ray and sphere casts. Built from a LevelSet, then
-// independent of OpenVDB.
+// independent of OpenVDB. A TiledField samples a field that does not fit into memory.
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <glm/vec3.hpp>
 #include <limits>
 #include <memory>
@@ -18,7 +19,8 @@ namespace bilayer {
 
 namespace detail {
 struct FieldData;
-}
+class TiledFieldData;
+}  // namespace detail
 
 /// How a field stores its distances.
 enum class Storage {
@@ -150,6 +152,56 @@ class Field {
   private:
     std::shared_ptr<const detail::FieldData> data_;
     Sample (*sample_)(const detail::FieldData&, const glm::vec3&) noexcept;  // the fastest for this processor
+};
+
+/// A field in tiles, as `bilayer build --tiles` writes it. A tile is read when a query falls into it. The tiles that
+/// were used last stay in memory, within a budget. Copies share them. Queries may run on any number of threads at once.
+///
+/// Queries throw std::runtime_error that names the file of a tile that is missing, damaged, or not the one that the
+/// manifest describes. Reading a tile takes about twice its memory for a moment. Reading goes on one tile at a time,
+/// and each thread holds the tile that it queries.
+class TiledField {
+  public:
+    /// Opens the folder of a field. Reads manifest.json, the coarse cells of all tiles (16 bytes per block of 8^3
+    /// voxels), and the smallest tile.
+    /// @param folder  with manifest.json
+    /// @param budget  max memory of the tiles that are kept; a single tile is kept even if it is larger [bytes]
+    /// Throws std::runtime_error that names a file that is missing or damaged.
+    TiledField(const std::filesystem::path& folder, std::size_t budget, const FieldOptions& options = {});
+
+    /// Distance and gradient at a point in field coordinates [m]. The result is that of Field::sample() of the merged
+    /// field, bit for bit, at any point.
+    Sample sample(const glm::vec3& point) const;
+
+    /// The same for many points. Each tile is read at most once. Throws std::invalid_argument if the spans differ in
+    /// length.
+    void sample(std::span<const glm::vec3> points, std::span<Sample> samples) const;
+
+    /// The distance only, as Sample::distance.
+    float distance(const glm::vec3& point) const;
+
+    /// Whether a point is inside: the sign of the sample. False for a non-finite point.
+    bool inside(const glm::vec3& point) const;
+
+    /// The closest zero of the interpolant, as Field::closest() without the mesh finds it, with the same tolerances.
+    /// Reads the tiles that are nearer than it, the nearest first.
+    /// @param maxDistance  search radius [m]
+    ClosestPoint closest(const glm::vec3& point, float maxDistance = std::numeric_limits<float>::infinity()) const;
+
+    /// The first point of a ray inside the solid, as Field::raycast() without the mesh finds it, to 1e-9 voxels. Reads
+    /// the tiles with surface along the ray, up to the hit.
+    std::optional<RayHit> raycast(const Ray& ray) const;
+
+    float voxelSize() const noexcept;        ///< [m]
+    float exteriorWidth() const noexcept;    ///< [m]
+    float interiorWidth() const noexcept;    ///< [m]
+    const Bounds& bounds() const noexcept;   ///< of all points in the band [m]
+    std::size_t tileCount() const noexcept;  ///< of the folder, those without a file included
+    std::size_t tilesRead() const;           ///< count of tiles that were read since the folder was opened
+    std::size_t memoryBytes() const;         ///< of the tiles in memory and the coarse cells of all [bytes]
+
+  private:
+    std::shared_ptr<const detail::TiledFieldData> data_;
 };
 
 }  // namespace bilayer

@@ -4,15 +4,13 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <stdexcept>
 
 #include <bilayer/sdf/vdb_io.h>
 #include "sdf/grid/vdb_grids.h"
+#include "sdf/tiles/tile_manifest.h"
 #include "sdf/tiles/tile_merge.h"
 #include "tools/commands.h"
 #include "tools/output.h"
-#include "tools/tiles/tile_folder.h"
-#include "tools/tiles/tile_plan.h"
 
 namespace bilayer::tools {
 
@@ -27,24 +25,11 @@ struct Arguments {
 void run(const Arguments& a) {
     requireWritable(a.output);
     const Stopwatch watch;
-    const TileFolder folder(a.folder);
-    if (!std::filesystem::exists(folder.manifest()))
-        throw std::runtime_error(
-            fmt::format("{}: no such file; `bilayer build --tiles` writes it when all tiles are there",
-                        folder.manifest().string()));
-    const Json manifest = readJson(folder.manifest());
     TileMerger merger;
-    try {
-        for (const Json& record : manifest.at("tiles")) {
-            if (record.at("file").is_null()) continue;
-            const std::filesystem::path path = folder.root() / record.at("file").get<std::string>();
-            if (!isIntact(folder, record))
-                throw std::runtime_error(fmt::format(
-                    "{}: is missing or damaged: repeat `bilayer build --tiles`, which builds it again", path.string()));
-            merger.add(*readGrids(path));
-        }
-    } catch (const Json::exception& error) {
-        throw std::runtime_error(fmt::format("{}: is no manifest ({})", folder.manifest().string(), error.what()));
+    for (const TileRecord& tile : readTileManifest(a.folder).tiles) {
+        if (tile.field.path.empty()) continue;
+        tile.field.requireIntact();
+        merger.add(*readGrids(tile.field.path));
     }
     const LevelSet field = merger.merged();
     writeVdb(a.output, field);

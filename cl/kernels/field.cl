@@ -55,7 +55,7 @@ float interpolationError(float3 fraction) {
 float clearanceAt(const Field* field, double3 position) {
     const double3 point = position / (double)(PART_SIDE);
     const int3 size = BLOCK_SIDE / PART_SIDE * blocksOf(field);
-    const int3 part = min(convert_int3(clamp(convert_float3(point), (float3)(0.0f), convert_float3(size))), size - 1);
+    const int3 part = min(convert_int3(clamp(point, (double3)(0.0), convert_double3(size))), size - 1);
     const double3 offset = point - (convert_double3(part) + 0.5);
     const float length = (float)(sqrt(offset.x * offset.x + offset.y * offset.y + offset.z * offset.z));
     const float centre = (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / CLEARANCE_STEPS);

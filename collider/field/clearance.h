@@ -38,7 +38,7 @@ class Clearance {
 
     /// A lower bound of the distance to the surface; not positive where it is unknown [coarse cells].
     float around(const glm::dvec3& point) const noexcept {
-        const glm::ivec3 part = partOf(glm::vec3(point));
+        const glm::ivec3 part = partOf(point);
         return std::abs(centreOf(part)) - float(glm::distance(point, glm::dvec3(part) + 0.5));
     }
 
@@ -62,11 +62,16 @@ class Clearance {
 
   private:
     // maps NaN to 0
-    glm::vec3 clamped(const glm::vec3& p) const noexcept {
-        return {std::min(std::max(0.f, p.x), extent_.x), std::min(std::max(0.f, p.y), extent_.y),
-                std::min(std::max(0.f, p.z), extent_.z)};
+    template <class Point>
+    Point clamped(const Point& p) const noexcept {
+        using Real = typename Point::value_type;
+        return {std::min(std::max(Real(0), p.x), Real(extent_.x)), std::min(std::max(Real(0), p.y), Real(extent_.y)),
+                std::min(std::max(Real(0), p.z), Real(extent_.z))};
     }
-    glm::ivec3 partOf(const glm::vec3& point) const noexcept { return glm::min(glm::ivec3(clamped(point)), size_ - 1); }
+    template <class Point>
+    glm::ivec3 partOf(const Point& point) const noexcept {
+        return glm::min(glm::ivec3(clamped(point)), size_ - 1);
+    }
     std::size_t entryOf(const glm::ivec3& part) const noexcept {
         const glm::ivec3 block = part >> 1;
         return (std::size_t(block.x) * data_.blocks.y + block.y) * data_.blocks.z + block.z;

@@ -2,12 +2,15 @@
 // An exact distance transform of the coarse cells that the surface may meet.
 #include "collider/field/coarse_distance.h"
 
+#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -18,6 +21,7 @@ namespace {
 
 constexpr int perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
 constexpr int maxParts = 16;  // distance limit of the bounds [coarse cells]
+static_assert(maxParts <= perBlock * clearanceReach);
 
 // Squared distances from the centres of coarse cells to the nearest one that the surface meets. The unit is half a
 // coarse cell, so that distances to faces are integers.
@@ -82,27 +86,31 @@ void transform(LargeArray<SquaredSteps>& squares, const glm::ivec3& size) {
     });
 }
 
-// Calls visit(entry, index) for the entries of the directory, with the index of their first coarse cell. nextParts()
-// returns the offsets of the others.
-template <class Visit>
-void forEachEntry(const FieldLayout& field, const Visit& visit) {
-    const glm::ivec3 size = field.parts();
-    tbb::parallel_for(0, field.blocks.x, [&](int x) {
-        for (int y = 0; y < field.blocks.y; ++y) {
-            const std::size_t entry = field.entryOf({x, y, 0});
-            const std::size_t part = (std::size_t(perBlock * x) * size.y + std::size_t(perBlock * y)) * size.z;
-            for (int z = 0; z < field.blocks.z; ++z) visit(entry + std::size_t(z), part + std::size_t(perBlock * z));
-        }
-    });
-}
+// The coarse cells of a box of blocks.
+struct Cells {
+    glm::ivec3 size;                             // along each axis
+    std::array<std::size_t, blockParts> next{};  // offsets of a block's cells from its first
+    LargeArray<SquaredSteps> squares;
 
-std::array<std::size_t, blockParts> nextParts(const FieldLayout& field) {
-    const glm::ivec3 size = field.parts();
-    std::array<std::size_t, blockParts> next;
-    for (int k = 0; k < blockParts; ++k)
-        next[k] = (std::size_t(k >> 2) * size.y + std::size_t(k >> 1 & 1)) * size.z + std::size_t(k & 1);
-    return next;
-}
+    explicit Cells(const glm::ivec3& blocks)
+        : size(perBlock * blocks), squares(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z)) {
+        for (int k = 0; k < blockParts; ++k) next[std::size_t(k)] = indexOf({k >> 2, k >> 1 & 1, k & 1});
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, squares.size()), [&](const auto& range) {
+            std::fill(squares.data() + range.begin(), squares.data() + range.end(), farAway);
+        });
+    }
+
+    std::size_t indexOf(const glm::ivec3& cell) const {
+        return (std::size_t(cell.x) * std::size_t(size.y) + std::size_t(cell.y)) * std::size_t(size.z) +
+               std::size_t(cell.z);
+    }
+
+    void enter(const SurfaceBlock& block, const glm::ivec3& place) {
+        const std::size_t cell = indexOf(perBlock * place);
+        for (int k = 0; k < blockParts; ++k)
+            if (block.meets >> k & 1) squares[cell + next[std::size_t(k)]] = 0;
+    }
+};
 
 // The square roots of all squared distances, rounded down [steps].
 std::array<std::int8_t, farAway + 1> rootsOfSquares() {
@@ -115,30 +123,35 @@ std::array<std::int8_t, farAway + 1> rootsOfSquares() {
 
 }  // namespace
 
-void measureClearances(FieldLayout& field, std::span<const std::array<bool, Clearance::blockParts>> meets) {
+void measureClearances(FieldLayout& field, const glm::ivec3& first, std::span<const SurfaceBlock> surface, int margin) {
     field.centres = LargeArray<std::int8_t>(field.entries() * blockParts);
     if (!field.findsSurface()) {
         std::fill_n(field.centres.data(), field.centres.size(), std::int8_t(0));
         return;
     }
-    const glm::ivec3 size = field.parts();
-    LargeArray<SquaredSteps> squares(std::size_t(size.x) * size.y * size.z);
-    const auto next = nextParts(field);
-    forEachEntry(field, [&](std::size_t entry, std::size_t part) {
-        const std::int32_t block = field.directory[entry];
-        for (int k = 0; k < blockParts; ++k) squares[part + next[k]] = block >= 0 && meets[block][k] ? 0 : farAway;
-    });
-    transform(squares, size);
-    const auto roots = rootsOfSquares();
-    forEachEntry(field, [&](std::size_t entry, std::size_t part) {
-        const std::int32_t block = field.directory[entry];
-        const bool emptyInside = block == FieldLayout::emptyInside;
-        std::int8_t* const centres = field.centres.data() + entry * blockParts;
-        for (int k = 0; k < blockParts; ++k) {
-            const std::int8_t root = roots[squares[part + next[k]]];
-            const bool inside = block < 0 ? emptyInside : field.minima[std::size_t(block) * blockParts + k] < 0;
-            centres[k] = std::int8_t(inside ? -root : root);
+    const glm::ivec3 blocks = field.blocks + 2 * margin;
+    Cells cells(blocks);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, surface.size()), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const glm::ivec3 place = (surface[i].first - first) / FieldFrame::side + margin;
+            if (place == glm::clamp(place, glm::ivec3(0), blocks - 1)) cells.enter(surface[i], place);
         }
+    });
+    transform(cells.squares, cells.size);
+    const auto roots = rootsOfSquares();
+    tbb::parallel_for(0, field.blocks.x, [&](int x) {
+        for (int y = 0; y < field.blocks.y; ++y)
+            for (int z = 0; z < field.blocks.z; ++z) {
+                const std::size_t entry = field.entryOf({x, y, z});
+                const std::size_t cell = cells.indexOf(perBlock * (glm::ivec3(x, y, z) + margin));
+                const std::int32_t block = field.directory[entry];
+                const bool emptyInside = block == FieldLayout::emptyInside;
+                for (std::size_t k = 0; k < blockParts; ++k) {
+                    const std::int8_t root = roots[std::size_t(cells.squares[cell + cells.next[k]])];
+                    const bool inside = block < 0 ? emptyInside : field.minima[std::size_t(block) * blockParts + k] < 0;
+                    field.centres[entry * blockParts + k] = std::int8_t(inside ? -root : root);
+                }
+            }
     });
 }
 

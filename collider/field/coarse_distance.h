@@ -3,7 +3,7 @@
 // Tested by tests/collider/field.cpp through Field::sample().
 #pragma once
 
-#include <array>
+#include <glm/vec3.hpp>
 #include <span>
 
 #include "collider/field/field_layout.h"
@@ -12,7 +12,9 @@ namespace bilayer::detail {
 
 /// Computes FieldLayout::centres: lower bounds of the distances outside the band. The directory and the minima must be
 /// filled.
-/// @param meets  by stored block, whether the surface may meet each of its coarse cells
-void measureClearances(FieldLayout& field, std::span<const std::array<bool, Clearance::blockParts>> meets);
+/// @param first    the first voxel of the directory
+/// @param surface  blocks of the field and of its surroundings
+/// @param margin   width of the surroundings that are considered [blocks]
+void measureClearances(FieldLayout& field, const glm::ivec3& first, std::span<const SurfaceBlock> surface, int margin);
 
 }  // namespace bilayer::detail

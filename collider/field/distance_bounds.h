@@ -18,10 +18,10 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <limits>
 
 #include "collider/field/field_data.h"
 #include "collider/field/interpolant.h"
+#include "collider/field/outer_bound.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
@@ -32,18 +32,6 @@ namespace {
 inline float interpolationError(const glm::vec3& fraction) {
     const glm::vec3 spread = fraction * (1.f - fraction);
     return std::sqrt(spread.x + spread.y + spread.z);
-}
-
-/// Bounds are rounded down, against the single-precision rounding of the voxel size and of the bound itself.
-constexpr double downward = 1 - 0x1p-22;
-
-/// For a point outside the directory's box. It first has to reach the box. There it is at most a cell's diagonal from a
-/// voxel outside the band.
-inline float boundOutside(const FieldData& field, const glm::dvec3& local) {
-    const double away = glm::distance(local, glm::clamp(local, glm::dvec3(0), field.extent()));
-    if (!std::isfinite(away)) return std::numeric_limits<float>::infinity();
-    const double bound = (away - double(cellDiagonal)) * double(field.voxelSize) + double(field.exteriorWidth);
-    return float(std::clamp(downward * bound, 0., double(std::numeric_limits<float>::max())));
 }
 
 /// For a point in a block that is entirely outside the band. The nearest voxel of the block is outside the band. It is

@@ -16,6 +16,7 @@
 #include "collider/field/batch.h"
 #include "collider/field/field_data.h"
 #include "collider/field/mesh_winding.h"
+#include "collider/field/outer_bound.h"
 #include "collider/field/path.h"
 #include "collider/field/zero_set.h"
 #include "sdf/sign/sign_choice.h"
@@ -193,10 +194,8 @@ ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const
     return closestOn(orBeyond(part, place, point, maxDistance), point, maxDistance);
 }
 
-// Replaces a far point: its distance to the zeros equals that from the replacement, to a millionth of the field's size.
 glm::dvec3 FieldData::approachedPoint(const glm::dvec3& local) const {
-    constexpr double sizes = 1e6;
-    return approached(local, glm::dvec3(0), extent(), sizes, sizes);
+    return detail::approachedPoint(*this, local);
 }
 
 ClosestPoint FieldData::closestZero(const glm::vec3& point, float maxDistance) const {

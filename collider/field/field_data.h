@@ -33,12 +33,19 @@ using Ints [[gnu::vector_size(16)]] = std::int32_t;
 
 struct FieldData;
 
+/// A point of a part of a field.
+struct PartPoint {
+    glm::vec3 point;   ///< in field coordinates [m]
+    glm::dvec3 local;  ///< from the part's first voxel, rounded as in the whole field [voxels]
+};
+
 /// Sampling functions for one instruction set and one storage. The gradient is computed where the distance is at most
 /// `gradientReach` [m].
 struct SampleKernels {
     Sample (*sampleAt)(const FieldData&, const glm::dvec3& local, float gradientReach) noexcept;
     Sample (*samplePoint)(const FieldData&, const glm::vec3& point) noexcept;
     Sample (*sampleWithin)(const FieldData&, const glm::vec3& point, float gradientReach) noexcept;
+    Sample (*sampleInPart)(const FieldData&, const PartPoint& point) noexcept;
     void (*sampleMany)(const FieldData&, std::span<const glm::vec3> points, Sample*) noexcept;
 };
 
@@ -47,6 +54,8 @@ const SampleKernels& sampleKernels(Storage storage);
 
 struct FieldData : FieldLayout {
     FieldData(const LevelSet& levelSet, Storage storage);
+    /// Of a part of a field, for samples alone.
+    explicit FieldData(FieldLayout layout);
     /// Shares the samples.
     FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outward);
     FieldData(const FieldData&) = delete;
@@ -82,7 +91,6 @@ struct FieldData : FieldLayout {
     // the origin.
     glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) * perMetre; }
     glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
-    glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
 
     /// Computes the gradient where the distance is at most `gradientReach` [m].
     Sample sample(const glm::dvec3& local, float gradientReach) const noexcept {

@@ -4,7 +4,6 @@
 
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_sort.h>
-#include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
 #include <array>
@@ -12,10 +11,11 @@
 #include <cstring>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include <bilayer/sdf/grids.h>
+#include "collider/field/block_summary.h"
 #include "collider/field/coarse_distance.h"
-#include "collider/field/interpolant.h"
 #include "collider/field/leaf_block.h"
 #include "sdf/base/morton.h"
 #include "sdf/base/openvdb.h"
@@ -29,16 +29,8 @@ using Accessor = openvdb::FloatGrid::ConstAccessor;
 
 constexpr int side = FieldLayout::side, stride = FieldLayout::stride;
 constexpr std::int64_t maxBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
-constexpr int partSide = Clearance::partSide, perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
-constexpr float nearSurface = 0.5f * cellDiagonal;  // max distance from surface in a cell to its nearest voxel [voxels]
-constexpr int minSteps = 126;                       // from 0 to the end of the band, for the stored minima
-
-// A leaf needs a block if it has voxels of the band, or voxels of both signs (for bands below one voxel).
-bool needsBlock(const FloatTree::LeafNodeType& leaf) {
-    if (!leaf.getValueMask().isOff()) return true;
-    const auto [low, high] = std::minmax_element(leaf.buffer().data(), leaf.buffer().data() + side * side * side);
-    return (*low < 0) != (*high < 0);
-}
+constexpr int blockParts = Clearance::blockParts;
+constexpr int minSteps = 126;  // from 0 to the end of the band, for the stored minima
 
 [[noreturn]] void throwTooLong() {
     throw std::invalid_argument("the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
@@ -57,54 +49,6 @@ void sortAlongMortonCurve(std::vector<Coord>& origins, const Coord& first) {
 // The unit of stored minima [m].
 float minimaStepOf(const FieldFrame& frame) {
     return std::max(frame.exteriorWidth, frame.interiorWidth) / float(minSteps);
-}
-
-// Summary of a block's coarse cells.
-struct BlockSummary {
-    std::array<float, blockParts> lowest;       // min value of the voxels around each coarse cell [m]
-    std::array<bool, blockParts> meetsSurface;  // a voxel is close enough to the surface, or both signs occur
-};
-
-// Minima and maxima of a quarter of a block, over x and y, by place along the last axis.
-struct Quarter {
-    using FourFloats [[gnu::vector_size(16)]] = float;
-
-    float lowest[stride], highest[stride];
-
-    explicit Quarter(const float* rows) {
-        for (int z = 0; z < stride; z += 4) {
-            // the last four overlap the previous ones
-            const float* from = rows + std::min(z, stride - 4);
-            FourFloats low, high;
-            std::memcpy(&low, from, sizeof low);
-            high = low;
-            for (int x = 0; x <= partSide; ++x)
-                for (int y = 0; y <= partSide; ++y) {
-                    FourFloats values;
-                    std::memcpy(&values, from + (x * stride + y) * stride, sizeof values);
-                    low = values < low ? values : low;
-                    high = values > high ? values : high;
-                }
-            std::memcpy(lowest + std::min(z, stride - 4), &low, sizeof low);
-            std::memcpy(highest + std::min(z, stride - 4), &high, sizeof high);
-        }
-    }
-};
-
-BlockSummary summaryOf(const float* block, float voxelSize) {
-    BlockSummary summary;
-    for (int i = 0; i < blockParts; i += perBlock) {
-        const Quarter quarter(block + partSide * stride * ((i >> 2) * stride + (i >> 1 & 1)));
-        for (int part = 0; part < perBlock; ++part) {
-            const int first = part * partSide;
-            const float lowest = *std::min_element(&quarter.lowest[first], &quarter.lowest[first] + partSide + 1),
-                        highest = *std::max_element(&quarter.highest[first], &quarter.highest[first] + partSide + 1);
-            summary.lowest[i + part] = lowest;
-            summary.meetsSurface[i + part] = std::min(std::abs(lowest), std::abs(highest)) <= nearSurface * voxelSize ||
-                                             (lowest < 0) != (highest < 0);
-        }
-    }
-    return summary;
 }
 
 bool isBeyondBand(float value, const FieldFrame& frame) {
@@ -142,9 +86,9 @@ void enterSides(FieldLayout& field, const FloatTree& tree, const Coord& first) {
     });
 }
 
-// Fills the blocks and enters them in the directory. Returns whether the surface meets each of their coarse cells.
-std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const FloatTree& tree,
-                                                      const std::vector<Coord>& origins, const Coord& first) {
+// Fills the blocks and enters them in the directory. Returns where the surface may meet them.
+std::vector<SurfaceBlock> enterBlocks(FieldLayout& field, const FloatTree& tree, const std::vector<Coord>& origins,
+                                      const Coord& first) {
     field.stored = origins.size();
     const std::size_t floats = field.stored * FieldLayout::blockFloats;
     if (field.storage == Storage::float32)
@@ -152,7 +96,7 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
     else
         field.values16 = LargeArray<std::int16_t>(floats);
     field.minima = LargeArray<std::int8_t>(field.stored * blockParts);
-    std::vector<std::array<bool, blockParts>> meets(field.stored);
+    std::vector<SurfaceBlock> surface(field.stored);
     const float minimaStep = minimaStepOf(field);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, field.stored), [&](const auto& range) {
         const Accessor accessor(tree);
@@ -166,13 +110,36 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
             else
                 store(block.data(), field, field.step, field.values16.data() + i * FieldLayout::blockFloats);
             const BlockSummary summary = summaryOf(block.data(), field.voxelSize);
-            meets[i] = summary.meetsSurface;
+            surface[i] = {{origins[i].x(), origins[i].y(), origins[i].z()}, summary.meetsSurface};
             for (int k = 0; k < blockParts; ++k)
                 field.minima[i * blockParts + k] =
                     std::int8_t(std::clamp(std::floor(summary.lowest[k] / minimaStep), -127.f, 127.f));
         }
     });
-    return meets;
+    return surface;
+}
+
+// The leaves in a box that need a block.
+std::vector<Coord> storedBlocks(const FloatTree& tree, const openvdb::CoordBBox& within) {
+    std::vector<Coord> origins;
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+        if (within.isInside(leaf->origin()) && needsBlock(*leaf)) origins.push_back(leaf->origin());
+    return origins;
+}
+
+glm::dvec3 placeOf(const openvdb::FloatGrid& grid, const Coord& voxel) {
+    const openvdb::Vec3d p = grid.indexToWorld(voxel);
+    return {p.x(), p.y(), p.z()};
+}
+
+// Fills the arrays of a field whose box is known, but for the distances to the surface. Returns where the surface may
+// meet the blocks.
+std::vector<SurfaceBlock> enter(FieldLayout& field, const openvdb::FloatGrid& grid, std::vector<Coord> origins,
+                                const Coord& first) {
+    sortAlongMortonCurve(origins, first);
+    field.origin = placeOf(grid, first);
+    enterSides(field, grid.tree(), first);
+    return enterBlocks(field, grid.tree(), origins, first);
 }
 
 }  // namespace
@@ -188,42 +155,45 @@ bool FieldFrame::findsSurface() const {
 }
 
 FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
-    : FieldFrame{.voxel = levelSet.grids().distance->voxelSize()[0],
-                 .voxelSize = levelSet.voxelSize(),
-                 .exteriorWidth = levelSet.exteriorWidth(),
-                 .interiorWidth = levelSet.interiorWidth()},
-      storage(storage),
-      step(std::max(exteriorWidth, interiorWidth) / float(beyondOutside - 1)) {
-    perMetre = 1 / voxel;
+    : FieldLayout(FieldFrame{.voxel = levelSet.grids().distance->voxelSize()[0],
+                             .voxelSize = levelSet.voxelSize(),
+                             .exteriorWidth = levelSet.exteriorWidth(),
+                             .interiorWidth = levelSet.interiorWidth()},
+                  storage) {
     const openvdb::FloatGrid& grid = *levelSet.grids().distance;
-    const openvdb::tree::LeafManager<const FloatTree> leaves(grid.tree());
-    std::vector<Coord> origins;
-    openvdb::CoordBBox box;
-    for (std::size_t i = 0; i < leaves.leafCount(); ++i)
-        if (needsBlock(leaves.leaf(i))) {
-            origins.push_back(leaves.leaf(i).origin());
-            box.expand(origins.back());
-        }
+    std::vector<Coord> origins = storedBlocks(grid.tree(), openvdb::CoordBBox::inf());
     if (origins.empty()) throw std::invalid_argument("the level set has no voxel in its band");
+    openvdb::CoordBBox box;
+    for (const Coord& block : origins) box.expand(block);
 
     // in 64 bits: the extent of a file's data may exceed an int
     for (int axis = 0; axis < 3; ++axis)
         if (std::int64_t(box.max()[axis]) - box.min()[axis] >= std::int64_t(side) * maxBlocksAlong) throwTooLong();
 
     const Coord first = box.min();
-    sortAlongMortonCurve(origins, first);
     blocks = glm::ivec3((box.max() - first).x(), (box.max() - first).y(), (box.max() - first).z()) / side + 1;
     requireSize();
-    enterSides(*this, grid.tree(), first);
-    measureClearances(*this, enterBlocks(*this, grid.tree(), origins, first));
-
-    const auto world = [&](const Coord& voxel) {
-        const openvdb::Vec3d p = grid.indexToWorld(voxel);
-        return glm::dvec3(p.x(), p.y(), p.z());
-    };
-    origin = world(first);
+    const std::vector<SurfaceBlock> surface = enter(*this, grid, std::move(origins), first);
+    measureClearances(*this, {first.x(), first.y(), first.z()}, surface, 0);
     const openvdb::CoordBBox active = grid.evalActiveVoxelBoundingBox();
-    bounds = {glm::vec3(world(active.min())), glm::vec3(world(active.max()))};
+    bounds = {glm::vec3(placeOf(grid, active.min())), glm::vec3(placeOf(grid, active.max()))};
+}
+
+FieldLayout::FieldLayout(const FieldFrame& frame, const Grids& grids, const LayoutPart& part, Storage storage)
+    : FieldLayout(frame, storage) {
+    blocks = part.blocks;
+    requireSize();
+    const Coord first(part.first.x, part.first.y, part.first.z);
+    const auto box =
+        openvdb::CoordBBox(first, first + Coord(side * blocks.x - 1, side * blocks.y - 1, side * blocks.z - 1));
+    const openvdb::FloatGrid& grid = *grids.distance;
+    enter(*this, grid, storedBlocks(grid.tree(), box), first);
+    measureClearances(*this, part.first, part.surface, clearanceReach);
+}
+
+FieldLayout::FieldLayout(const FieldFrame& frame, Storage storage)
+    : FieldFrame(frame), storage(storage), step(std::max(exteriorWidth, interiorWidth) / float(beyondOutside - 1)) {
+    perMetre = 1 / voxel;
 }
 
 FieldLayout FieldLayout::shared() const {

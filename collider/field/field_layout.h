@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vector_relational.hpp>
+#include <span>
 
 #include <bilayer/collider/field.h>
 
@@ -35,6 +36,7 @@ struct FieldFrame {
     float voxelSize = 0, exteriorWidth = 0, interiorWidth = 0;  ///< [m]
     Bounds bounds{};                                            ///< of all points in the band [m]
 
+    glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
     std::size_t entries() const { return std::size_t(blocks.x) * blocks.y * blocks.z; }
     std::size_t entryOf(const glm::ivec3& block) const {
         return (std::size_t(block.x) * blocks.y + block.y) * blocks.z + block.z;
@@ -49,6 +51,22 @@ struct FieldFrame {
 
     glm::ivec3 parts() const { return Clearance::perBlock * blocks; }
 };
+
+/// A block that stores samples of the band.
+struct SurfaceBlock {
+    glm::ivec3 first;     ///< its first voxel
+    std::uint32_t meets;  ///< bit k: the surface may meet coarse cell k
+};
+
+/// A box of blocks of a larger field.
+struct LayoutPart {
+    glm::ivec3 first, blocks;  ///< the first voxel, and the count of blocks along each axis
+    /// Blocks of the whole field: all of the part's own, and all others within clearanceReach of the box.
+    std::span<const SurfaceBlock> surface;
+};
+
+/// Blocks beyond do not change the distance bounds of a block [blocks].
+inline constexpr int clearanceReach = 8;
 
 /// The query data, independent of OpenVDB.
 struct FieldLayout : FieldFrame {
@@ -68,6 +86,10 @@ struct FieldLayout : FieldFrame {
     /// Throws std::invalid_argument if no voxel is in the band, if the box holds more than 2^26 blocks of 8^3 voxels,
     /// or if it holds more than 2^19 along an axis.
     explicit FieldLayout(const LevelSet& levelSet, Storage storage = Storage::float32);
+    /// Lays out a part of a field. Its samples and bounds are those of the whole field.
+    /// @param frame  of the whole field
+    /// @param grids  with all voxels of the part, and the next ones above it
+    FieldLayout(const FieldFrame& frame, const Grids& grids, const LayoutPart& part, Storage storage);
     FieldLayout(FieldLayout&&) noexcept = default;
     FieldLayout& operator=(FieldLayout&&) noexcept = default;
 
@@ -83,6 +105,7 @@ struct FieldLayout : FieldFrame {
 
   private:
     explicit FieldLayout(const FieldFrame& frame) : FieldFrame(frame) {}
+    FieldLayout(const FieldFrame& frame, Storage storage);
 };
 
 }  // namespace bilayer::detail

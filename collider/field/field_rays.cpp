@@ -9,6 +9,7 @@
 #include <bilayer/collider/field.h>
 #include "collider/field/field_data.h"
 #include "collider/field/mesh_rays.h"
+#include "collider/field/ray_paths.h"
 #include "collider/field/sphere_tracing.h"
 #include "collider/field/triangle_tests.h"
 #include "collider/field/zero_set.h"
@@ -24,14 +25,6 @@ constexpr double endRounding = 1 + 1e-12;
 /// Spheres with a smaller radius are cast as rays [voxels].
 constexpr double minRadius = 1e-6;
 
-bool isRay(const Ray& ray) {
-    return isFinite(ray.origin) && isFinite(ray.direction) && ray.direction != glm::vec3(0) && ray.maxDistance >= 0;
-}
-
-Path pathOf(const Ray& ray) {
-    return {glm::dvec3(ray.origin), glm::normalize(glm::dvec3(ray.direction)), double(ray.maxDistance)};
-}
-
 // The normal of the hit face, facing the path's start.
 glm::vec3 normalOf(const Mesh& mesh, const MeshHit& hit, const Path& path) {
     const TriangleCorners c = cornersOf(mesh, hit.triangle);
@@ -39,11 +32,9 @@ glm::vec3 normalOf(const Mesh& mesh, const MeshHit& hit, const Path& path) {
     return glm::vec3(glm::dot(n, path.direction) > 0 ? -n : n);
 }
 
-// The hit of a ray that starts inside.
 RayHit hitAtStart(const FieldData& field, const glm::vec3& origin, const glm::dvec3& direction) {
-    const glm::vec3 gradient = field.sample(field.toLocal(origin), std::numeric_limits<float>::infinity()).gradient;
-    const float steepness = glm::length(gradient);
-    return {.distance = 0, .position = origin, .normal = steepness > 0 ? gradient / steepness : glm::vec3(-direction)};
+    return detail::hitAtStart(field.sample(field.toLocal(origin), std::numeric_limits<float>::infinity()), origin,
+                              direction);
 }
 
 // In voxels from the directory's first voxel.

@@ -47,6 +47,12 @@ HWY_INLINE glm::dvec3 localOf(const FieldData& field, const glm::vec3& point) {
 HWY_INLINE glm::dvec3 localOf(const FieldData&, const glm::dvec3& local) {
     return local;
 }
+HWY_INLINE glm::dvec3 localOf(const FieldData&, const PartPoint& point) {
+    return point.local;
+}
+HWY_INLINE FixedPlace placeOf(const FieldData& field, const PartPoint& point) {
+    return placeOf(field, point.point);
+}
 
 /// Samples a cell that is partly outside the band.
 /// @param cell  its first voxel
@@ -87,7 +93,7 @@ HWY_INLINE void prefetchAlong(const Value* v) {
 }
 
 /// @param limited  whether the gradient is computed only where the distance is at most `gradientReach`
-/// @param point    glm::vec3 in field coordinates [m], or glm::dvec3 from the directory's first voxel [voxels]
+/// @param point    glm::vec3 in field coordinates [m], glm::dvec3 from the directory's first voxel [voxels], or both
 template <class Value, bool limited, class Point>
 HWY_INLINE Sample sampleOne(const FieldData& field, const Point& point, float gradientReach) {
     const FixedPlace place = placeOf(field, point);
@@ -115,8 +121,8 @@ Sample sampleWithin(const FieldData& field, const Point& point, float gradientRe
     return sampleOne<Value, true>(field, point, gradientReach);
 }
 
-template <class Value>
-Sample samplePoint(const FieldData& field, const glm::vec3& point) noexcept {
+template <class Value, class Point>
+Sample samplePoint(const FieldData& field, const Point& point) noexcept {
     return sampleOne<Value, false>(field, point, infinity);
 }
 
@@ -220,8 +226,8 @@ void sampleMany(const FieldData& field, std::span<const glm::vec3> points, Sampl
 }
 
 template <class Value>
-constexpr SampleKernels kernelsOf{sampleWithin<Value, glm::dvec3>, samplePoint<Value>, sampleWithin<Value, glm::vec3>,
-                                  sampleMany<Value>};
+constexpr SampleKernels kernelsOf{sampleWithin<Value, glm::dvec3>, samplePoint<Value, glm::vec3>,
+                                  sampleWithin<Value, glm::vec3>, samplePoint<Value, PartPoint>, sampleMany<Value>};
 
 const SampleKernels& kernels(Storage storage) {
     return storage == Storage::float32 ? kernelsOf<float> : kernelsOf<std::int16_t>;

@@ -85,7 +85,7 @@ FilledPart buildPart(const Mesh& mesh, const BuildOptions& options, const FieldP
             field.fillWithOwnSigns();
         else
             field.fill(mesh, options.sign, asAskedFor, options.method);
-        return FilledPart{field.grids(), field.signs().conflicts, field.faces()};
+        return FilledPart{field.grids(), field.signs().conflicts, field.faces(), field.border()};
     });
 }
 

@@ -30,6 +30,7 @@ struct FilledPart {
     std::shared_ptr<Grids> grids;  ///< possibly without any leaf
     std::size_t conflicts = 0;     ///< with a conflict, the signs are not those of the whole field
     FaceSides faces{};
+    openvdb::FloatTree::Ptr border;  ///< borderOf()
 };
 
 /// Builds a part of a field from the triangles near it.

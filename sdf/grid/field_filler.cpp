@@ -222,6 +222,7 @@ void FieldFiller::finish(Assembler& assembler) {
 void FieldFiller::trim() {
     if (!part_) return;
     faces_ = faceSides(distance_->tree(), *part_);
+    border_ = borderOf(distance_->tree(), *part_);
     trimToPart(distance_->tree(), *part_);
     if (triangle_) renumber(triangle_->tree(), *part_);
 }

@@ -64,6 +64,8 @@ class FieldFiller {
 
     /// Returns on which sides the outermost voxels of the part lie.
     const FaceSides& faces() const { return faces_; }
+    /// Returns borderOf() the part.
+    const openvdb::FloatTree::Ptr& border() const { return border_; }
 
     const Mesh& mesh() const { return mesh_; }
     const BuildOptions& options() const { return options_; }
@@ -89,6 +91,7 @@ class FieldFiller {
     MeshExtent extent_;
     FieldSigns signs_;
     FaceSides faces_{};
+    openvdb::FloatTree::Ptr border_;
     std::atomic<std::size_t> filledBlocks_ = 0;
     openvdb::FloatGrid::Ptr distance_;
     openvdb::Int32Grid::Ptr triangle_;

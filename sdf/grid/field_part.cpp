@@ -81,6 +81,27 @@ void addFace(const Accessor& values, const openvdb::Coord& block, int face, Voxe
         }
 }
 
+// Visits the blocks of a box that are not in its lower part `own`, some of them twice.
+template <class Visit>
+void forEachBlockAbove(const BlockBox& box, const BlockBox& own, Visit visit) {
+    for (int axis = 0; axis < 3; ++axis) {
+        BlockBox above = box;
+        above.first[axis] = own.end[axis];
+        forEachBlock(above, visit);
+    }
+}
+
+// Returns a copy of a leaf above a box. Only its voxels next to the box keep their values.
+Leaf* firstVoxelsOf(const Leaf& leaf, const BlockBox& box, float exterior) {
+    auto* first = new Leaf(leaf);
+    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+        const openvdb::Coord at = Leaf::offsetToLocalCoord(i);
+        for (int axis = 0; axis < 3; ++axis)
+            if (leaf.origin()[axis] >= box.end[axis] && at[axis] > 0) first->setValueOff(i, exterior);
+    }
+    return first;
+}
+
 }  // namespace
 
 BlockBox FieldPart::filled() const {
@@ -116,18 +137,30 @@ FaceSides faceSides(const openvdb::FloatTree& tree, const FieldPart& part) {
     return all;
 }
 
+openvdb::FloatTree::Ptr borderOf(const openvdb::FloatTree& tree, const FieldPart& part) {
+    const BlockBox box = filledWithin(part), own = part.own.within(part.lattice);
+    const float exterior = tree.background();
+    const Accessor values(tree);
+    const auto border = std::make_shared<openvdb::FloatTree>(exterior);
+    openvdb::tree::ValueAccessor<openvdb::FloatTree> blocks(*border);
+    forEachBlockAbove(box, own, [&](const openvdb::Coord& block) {
+        const Leaf* leaf = values.probeConstLeaf(block);
+        if (leaf)
+            blocks.addLeaf(firstVoxelsOf(*leaf, own, exterior));
+        else if (values.getValue(block) != exterior)
+            blocks.addTile(leafLevel, block, values.getValue(block), false);
+    });
+    return border;
+}
+
 void trimToPart(openvdb::FloatTree& tree, const FieldPart& part) {
     const BlockBox box = filledWithin(part), own = part.own.within(part.lattice);
     const float exterior = tree.background();
     openvdb::tree::ValueAccessor<openvdb::FloatTree> blocks(tree);
-    for (int axis = 0; axis < 3; ++axis) {
-        BlockBox above = box;
-        above.first[axis] = own.end[axis];
-        forEachBlock(above, [&](const openvdb::Coord& block) {
-            if (blocks.probeConstLeaf(block) || blocks.getValue(block) != exterior)
-                blocks.addTile(leafLevel, block, exterior, false);
-        });
-    }
+    forEachBlockAbove(box, own, [&](const openvdb::Coord& block) {
+        if (blocks.probeConstLeaf(block) || blocks.getValue(block) != exterior)
+            blocks.addTile(leafLevel, block, exterior, false);
+    });
     openvdb::tools::pruneTiles(tree);
 }
 

@@ -43,6 +43,10 @@ void floodPart(openvdb::FloatTree& tree, const FieldPart& part, float exterior, 
 /// Returns on which sides the outermost voxels of the part's own box lie. Call this after floodPart().
 FaceSides faceSides(const openvdb::FloatTree& tree, const FieldPart& part);
 
+/// Returns the first voxels above the part's own box, which the cells between its last blocks and the next ones need.
+/// All other values are those of space. Call this after floodPart() and before trimToPart().
+openvdb::FloatTree::Ptr borderOf(const openvdb::FloatTree& tree, const FieldPart& part);
+
 /// Removes what lies outside the part's own box.
 void trimToPart(openvdb::FloatTree& tree, const FieldPart& part);
 

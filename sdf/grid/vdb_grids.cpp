@@ -84,9 +84,7 @@ glm::dvec3 originOf(const openvdb::GridPtrVec& grids) {
     return glm::dvec3(0);
 }
 
-}  // namespace
-
-std::shared_ptr<Grids> readGrids(const std::filesystem::path& path) {
+openvdb::GridPtrVec readAll(const std::filesystem::path& path) {
     openvdb::initialize();
     requireInputFile(path);
     openvdb::GridPtrVec grids;
@@ -103,6 +101,10 @@ std::shared_ptr<Grids> readGrids(const std::filesystem::path& path) {
     }
     const glm::dvec3 origin = originOf(grids);
     for (const auto& grid : grids) shift(*grid, -origin);
+    return grids;
+}
+
+std::shared_ptr<Grids> fieldOf(const openvdb::GridPtrVec& grids, const std::filesystem::path& path) {
     auto result = std::make_shared<Grids>();
     const auto distance = first<openvdb::FloatGrid>(
         grids, [](const auto& grid) { return grid.getGridClass() == openvdb::GRID_LEVEL_SET; });
@@ -113,6 +115,29 @@ std::shared_ptr<Grids> readGrids(const std::filesystem::path& path) {
     for (const auto& grid : grids)
         if (grid->getName() == contactPoints) result->points = grid;
     return result;
+}
+
+}  // namespace
+
+std::shared_ptr<Grids> readGrids(const std::filesystem::path& path) {
+    return fieldOf(readAll(path), path);
+}
+
+TileGrids readTile(const std::filesystem::path& path) {
+    const openvdb::GridPtrVec grids = readAll(path);
+    const auto border = first<openvdb::FloatGrid>(grids, [](const auto& grid) { return grid.getName() == borderGrid; });
+    if (!border) throw std::runtime_error(fmt::format("{}: is no tile: it has no grid 'border'", path.string()));
+    return {fieldOf(grids, path), border};
+}
+
+openvdb::FloatTree::Ptr withBorder(const openvdb::FloatTree& tile, const openvdb::FloatTree& border) {
+    auto joined = std::make_shared<openvdb::FloatTree>(tile);
+    for (auto leaf = border.cbeginLeaf(); leaf; ++leaf) joined->addLeaf(new openvdb::FloatTree::LeafNodeType(*leaf));
+    auto space = border.cbeginValueOff();
+    space.setMaxDepth(openvdb::FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
+    for (; space; ++space)
+        if (*space != border.background()) joined->addTile(space.getLevel(), space.getCoord(), *space, false);
+    return joined;
 }
 
 openvdb::GridBase::Ptr withOrigin(const openvdb::GridBase::ConstPtr& grid, const glm::dvec3& origin) {

@@ -15,6 +15,21 @@ namespace bilayer::detail {
 /// is damaged or holds no level set.
 std::shared_ptr<Grids> readGrids(const std::filesystem::path& path);
 
+/// The name of a tile's grid with the voxels above its box.
+inline constexpr const char* borderGrid = "border";
+
+/// What the file of a tile holds.
+struct TileGrids {
+    std::shared_ptr<Grids> grids;
+    openvdb::FloatGrid::ConstPtr border;  ///< BuiltTile::border
+};
+
+/// Reads a tile. Throws as readGrids() does, and std::runtime_error that names the file if it has no border.
+TileGrids readTile(const std::filesystem::path& path);
+
+/// Returns a tree of the values of a tile and of the border above it.
+openvdb::FloatTree::Ptr withBorder(const openvdb::FloatTree& tile, const openvdb::FloatTree& border);
+
 /// Returns a grid whose transform has the origin of the mesh, as in files. The tree is shared. Throws
 /// std::invalid_argument if the grid is so far from zero that a file would round its voxels.
 openvdb::GridBase::Ptr withOrigin(const openvdb::GridBase::ConstPtr& grid, const glm::dvec3& origin);

@@ -10,6 +10,7 @@
 
 #include "sdf/base/openvdb.h"
 #include "sdf/grid/field_build.h"
+#include "sdf/grid/vdb_grids.h"
 #include "sdf/leaf/build_options.h"
 #include "sdf/leaf/build_size.h"
 
@@ -51,7 +52,10 @@ BuiltTile buildTile(std::span<const TileTriangle> triangles, const MeshFacts& fa
             "build this field in one piece",
             filled.conflicts));
     if (filled.grids->distance->tree().leafCount() == 0) return {};
-    return {std::move(filled.grids), filled.faces};
+    const openvdb::FloatGrid::Ptr border = openvdb::FloatGrid::create(filled.border);
+    border->setName(borderGrid);
+    border->setTransform(filled.grids->distance->transform().copy());
+    return {std::move(filled.grids), filled.faces, border};
 }
 
 double tileBytes(std::uint64_t triangles, double area, const Tiling& tiling, std::size_t tile,

@@ -36,6 +36,9 @@ struct BuiltTile {
     /// box.
     std::shared_ptr<Grids> grids;
     FaceSides faces{};  ///< without a grid, none
+    /// The voxels above the tile's box that the cells of its last blocks need. All others are space. Null if `grids`
+    /// is.
+    openvdb::FloatGrid::Ptr border;
 };
 
 /// Builds a tile. Its bytes are those of the whole field.

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "tools/batch/content_hash.h"
+#include "sdf/io/content_hash.h"
 #include "tools/output.h"
 
 namespace bilayer::tools {
@@ -25,7 +25,7 @@ std::filesystem::path BatchFolder::thumbnail(const std::string& name) const {
 }
 
 std::string BatchFolder::key(const std::string& name) {
-    return hex(contentHash(name));
+    return hex(detail::contentHash(name));
 }
 
 }  // namespace bilayer::tools

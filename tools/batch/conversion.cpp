@@ -16,12 +16,13 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "sdf/base/openvdb.h"
+#include "sdf/io/content_hash.h"
 #include "sdf/io/mapped_file.h"
 #include "sdf/io/vdb_checksum.h"
 #include "sdf/leaf/build_options.h"
 #include "sdf/leaf/build_size.h"
 #include "tools/batch/batch_folder.h"
-#include "tools/batch/content_hash.h"
+#include "tools/batch/mesh_file_hash.h"
 #include "tools/batch/thumbnail.h"
 
 namespace bilayer::tools {

@@ -12,7 +12,7 @@
 #include <optional>
 #include <system_error>
 
-#include "tools/batch/content_hash.h"
+#include "sdf/io/content_hash.h"
 #include "tools/batch/output_lock.h"
 #include "tools/batch/records.h"
 #include "tools/batch/signal_watch.h"
@@ -48,7 +48,7 @@ class Scheduler {
     explicit Scheduler(const BatchPlan& plan)
         : plan_(plan),
           records_(plan.folder.records(), plan.shard),
-          optionsHash_(hex(contentHash(plan.conversion.optionsText))) {
+          optionsHash_(hex(detail::contentHash(plan.conversion.optionsText))) {
         for (const BatchMesh& mesh : plan.meshes) waiting_.push_back(&mesh);
         result_.counts.total = plan.meshes.size();
     }

@@ -7,7 +7,7 @@
 #include <charconv>
 #include <cstdlib>
 
-#include "tools/batch/content_hash.h"
+#include "sdf/io/content_hash.h"
 
 namespace bilayer::tools {
 namespace {
@@ -31,7 +31,7 @@ std::optional<std::uint32_t> variable(const char* name) {
 }  // namespace
 
 bool Shard::contains(std::string_view name) const {
-    return contentHash(name) % count == index - 1;
+    return detail::contentHash(name) % count == index - 1;
 }
 
 std::string Shard::text() const {

@@ -8,9 +8,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
-#include "sdf/io/mapped_file.h"
-#include "tools/batch/content_hash.h"
 
 namespace bilayer::tools {
 
@@ -45,21 +44,13 @@ Json readJson(const std::filesystem::path& path) {
     }
 }
 
-std::string fileHash(const std::filesystem::path& path) {
-    constexpr std::size_t part = 1 << 26;
-    const MappedFile file(path, MappedFile::Paging::onDemand);
-    std::string hashes = std::to_string(file.bytes().size());
-    for (std::size_t at = 0; at < file.bytes().size(); at += part) {
-        hashes += hex(contentHash(file.bytes().substr(at, part)));
-        file.release();
-    }
-    return hex(contentHash(hashes));
-}
-
 bool isIntact(const TileFolder& folder, const Json& record) {
     if (record.at("file").is_null()) return true;
-    const std::filesystem::path path = folder.root() / record.at("file").get<std::string>();
-    return std::filesystem::is_regular_file(path) && fileHash(path) == record.at("hash");
+    const auto intact = [&](const char* file, const char* hash) {
+        const std::filesystem::path path = folder.root() / record.at(file).get<std::string>();
+        return std::filesystem::is_regular_file(path) && fileHash(path) == record.at(hash);
+    };
+    return intact("file", "hash") && intact("cells", "cellsHash");
 }
 
 }  // namespace bilayer::tools

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the tiles of a field are kept: one .vdb file a tile, manifest.json when all are there, and a folder `work`
-// while some are missing.
+// Where the tiles of a field are kept: a .vdb and a .cells file for each tile, manifest.json when all are there, and a
+// folder `work` while some are missing.
 //
 // Tested by tests/tools/tiles.cpp through run().
 #pragma once
@@ -19,6 +19,9 @@ class TileFolder {
 
     std::filesystem::path manifest() const { return root_ / "manifest.json"; }
     std::filesystem::path field(const glm::ivec3& tile) const { return root_ / (nameOf(tile) + ".vdb"); }
+
+    /// The surface blocks of a tile, which distance bounds in other tiles depend on.
+    std::filesystem::path cells(const glm::ivec3& tile) const { return root_ / (nameOf(tile) + ".cells"); }
 
     /// What a build has planned: the mesh, the options and the tiles. It is there when all triangles are sorted.
     std::filesystem::path plan() const { return work() / "plan.json"; }
@@ -47,11 +50,7 @@ void writeJson(const std::filesystem::path& path, const Json& json);
 /// Throws std::runtime_error that names the file if it cannot be read or is no JSON.
 Json readJson(const std::filesystem::path& path);
 
-/// Returns a hash of a file's bytes, of which only some are in memory at once. Throws std::runtime_error that names the
-/// file.
-std::string fileHash(const std::filesystem::path& path);
-
-/// Returns whether the file of a tile is there with the bytes that its record states. A tile without leaves has no
+/// Returns whether the files of a tile are there with the bytes that its record states. A tile without leaves has no
 /// file.
 bool isIntact(const TileFolder& folder, const Json& record);
 

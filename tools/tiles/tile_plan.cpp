@@ -28,6 +28,49 @@ Vec numbers(const Json& json) {
     return {json.at(0).get<Scalar>(), json.at(1).get<Scalar>(), json.at(2).get<Scalar>()};
 }
 
+// The box of the active voxels; null if there is none.
+Json bandOf(const openvdb::FloatGrid& grid) {
+    const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    if (box.empty()) return nullptr;
+    const auto corner = [](const openvdb::Coord& c) { return Json::array({c.x(), c.y(), c.z()}); };
+    return {{"lower", corner(box.min())}, {"upper", corner(box.max())}};
+}
+
+// The bytes that writeJson() writes.
+std::uint64_t bytesOf(const Json& json) {
+    return json.dump(1).size() + 1;
+}
+
+// What each rank has read and written, and what other ranks wrote of that.
+Json loadOfRanks(const std::vector<Json>& records, const Json& plan, const Json& sorting, int count) {
+    Json ranks = Json::array();
+    for (int rank = 0; rank < count; ++rank) {
+        std::uint64_t tiles = 0, read = 0, written = 0, fromOthers = rank > 0 ? bytesOf(plan) : 0;
+        std::uint64_t peak = rank > 0 ? 0 : sorting.at("peakRssBytes").get<std::uint64_t>();
+        double seconds = 0;
+        for (const Json& record : records) {
+            const std::uint64_t triangles = record.at("readBytes");
+            const bool own = record.at("rank") == rank;
+            if (rank == 0 && !own) fromOthers += bytesOf(record);
+            if (!own) continue;
+            ++tiles;
+            read += triangles;
+            written += record.value("writtenBytes", std::uint64_t(0));
+            if (rank > 0) fromOthers += triangles;
+            seconds += record.at("seconds").get<double>();
+            peak = std::max(peak, record.at("peakRssBytes").get<std::uint64_t>());
+        }
+        ranks.push_back({{"rank", rank},
+                         {"tiles", tiles},
+                         {"seconds", seconds},
+                         {"peakRssBytes", peak},
+                         {"readBytes", read},
+                         {"writtenBytes", written},
+                         {"exchangedBytes", fromOthers}});
+    }
+    return ranks;
+}
+
 const char* nameOf(const VoxelSides& sides) {
     return sides.inside && sides.outside ? "both" : sides.inside ? "inside" : "outside";
 }
@@ -97,6 +140,7 @@ Json TilePlan::manifest(const std::vector<Json>& records, int ranks) const {
     manifest["mesh"]["hash"] = facts_.hash == 0 ? Json() : Json(hex(facts_.hash));
     manifest["sum"] = {{"files", files},     {"leaves", leaves}, {"activeVoxels", voxels},
                        {"seconds", seconds}, {"ranks", ranks},   {"peakRssBytes", peak}};
+    manifest["ranks"] = loadOfRanks(records, plan_, plan_.at("sorting"), ranks);
     manifest["tiles"] = records;
     return manifest;
 }
@@ -113,6 +157,7 @@ Json recordOf(const glm::ivec3& place, const BlockBox& box, std::uint64_t triang
             {"triangles", triangles},
             {"leaves", count([](const openvdb::FloatGrid& grid) { return grid.tree().leafCount(); })},
             {"activeVoxels", count([](const openvdb::FloatGrid& grid) { return grid.activeVoxelCount(); })},
+            {"band", tile.grids ? bandOf(*tile.grids->distance) : Json()},
             {"faces", faces}};
 }
 

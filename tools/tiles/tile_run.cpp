@@ -13,8 +13,11 @@
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
+#include "collider/field/block_summary.h"
+#include "collider/field/surface_file.h"
 #include "sdf/base/usable_memory.h"
 #include "sdf/grid/vdb_grids.h"
+#include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
 #include "sdf/tiles/tile_sort.h"
 #include "tools/tiles/tile_folder.h"
@@ -183,20 +186,35 @@ class TileRun {
             built = wrapped([&] { return buildTile(triangles, plan.facts(), tiling, tile, a_.options); });
         }
         Json record = recordOf(place, tiling.own(tile).within(tiling.lattice()), count, built);
-        if (built.grids) {
-            const std::filesystem::path path = folder_.field(place);
-            openvdb::GridCPtrVec grids{withOrigin(built.grids->distance, plan.facts().origin)};
-            if (built.grids->triangle) grids.push_back(withOrigin(built.grids->triangle, plan.facts().origin));
-            writeGrids(path, grids);
-            record["file"] = path.filename().string();
-            record["hash"] = fileHash(path);
-        }
+        record["readBytes"] = count * sizeof(TileTriangle);
+        if (built.grids) writeTile(built, place, plan.facts().origin, tiling.own(tile), record);
         built = {};
         ::malloc_trim(0);  // what one tile has used is free for the next
         record["rank"] = ranks_.rank;
         record["seconds"] = watch.seconds();
         record["peakRssBytes"] = peakMemory();
         writeJson(folder_.record(place), record);
+    }
+
+    void writeTile(const BuiltTile& tile, const glm::ivec3& place, const glm::dvec3& origin, const BlockBox& own,
+                   Json& record) const {
+        const std::filesystem::path field = folder_.field(place), cells = folder_.cells(place);
+        openvdb::GridCPtrVec grids{withOrigin(tile.grids->distance, origin)};
+        if (tile.grids->triangle) grids.push_back(withOrigin(tile.grids->triangle, origin));
+        grids.push_back(withOrigin(tile.border, origin));
+        writeGrids(field, grids);
+        writeSurfaceBlocks(cells, surfaceBlocksOf(tile, own));
+        record["file"] = field.filename().string();
+        record["hash"] = fileHash(field);
+        record["cells"] = cells.filename().string();
+        record["cellsHash"] = fileHash(cells);
+        record["writtenBytes"] = std::filesystem::file_size(field) + std::filesystem::file_size(cells);
+    }
+
+    std::vector<SurfaceBlock> surfaceBlocksOf(const BuiltTile& tile, const BlockBox& own) const {
+        const auto coord = [](const glm::ivec3& v) { return openvdb::Coord(v.x, v.y, v.z); };
+        const openvdb::FloatTree::Ptr tree = withBorder(tile.grids->distance->tree(), tile.border->tree());
+        return surfaceBlocks(*tree, {coord(own.first), coord(own.end - 1)}, a_.options.voxelSize);
     }
 
     template <class Work>

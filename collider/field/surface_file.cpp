@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "collider/field/surface_file.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <stdexcept>
+
+#include "sdf/io/atomic_file.h"
+#include "sdf/io/input_file.h"
+
+namespace bilayer::detail {
+
+static_assert(sizeof(SurfaceBlock) == 16, "files of blocks have no gaps");
+
+void writeSurfaceBlocks(const std::filesystem::path& path, std::span<const SurfaceBlock> blocks) {
+    AtomicFile file(path);
+    std::ofstream stream(file.temporary(), std::ios::binary | std::ios::trunc);
+    stream.write(reinterpret_cast<const char*>(blocks.data()), std::streamsize(blocks.size_bytes()));
+    stream.close();
+    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
+    file.commit();
+}
+
+void readSurfaceBlocks(const std::filesystem::path& path, std::vector<SurfaceBlock>& blocks) {
+    requireInputFile(path);
+    const std::size_t bytes = std::filesystem::file_size(path), before = blocks.size();
+    blocks.resize(before + bytes / sizeof(SurfaceBlock));
+    std::ifstream stream(path, std::ios::binary);
+    stream.read(reinterpret_cast<char*>(blocks.data() + before),
+                std::streamsize((blocks.size() - before) * sizeof(SurfaceBlock)));
+    if (!stream || bytes % sizeof(SurfaceBlock) != 0)
+        throw std::runtime_error(fmt::format("{}: cannot be read, or is no whole count of blocks", path.string()));
+}
+
+}  // namespace bilayer::detail

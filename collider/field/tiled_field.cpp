@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Queries of fields in tiles.
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <vector>
+
+#include <bilayer/collider/field.h>
+#include "collider/field/batch.h"
+#include "collider/field/field_data.h"
+#include "collider/field/outer_bound.h"
+#include "collider/field/ray_paths.h"
+#include "collider/field/tiled_field_data.h"
+#include "collider/field/tiled_search.h"
+
+namespace bilayer {
+
+using namespace detail;
+
+TiledField::TiledField(const std::filesystem::path& folder, std::size_t budget, const FieldOptions& options)
+    : data_(std::make_shared<const TiledFieldData>(folder, budget, options.storage)) {}
+
+Sample TiledField::sample(const glm::vec3& point) const {
+    return data_->sample(point, data_->tileOf(point));
+}
+
+// Tile after tile, so that each is read once.
+void TiledField::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
+    requireSameLength(points.size(), samples.size(), "samples");
+    std::vector<std::optional<std::size_t>> tiles;
+    for (const glm::vec3& point : points) tiles.push_back(data_->tileOf(point));
+    std::vector<std::size_t> order(points.size());
+    std::iota(order.begin(), order.end(), std::size_t(0));
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return tiles[a] < tiles[b]; });
+    std::optional<std::size_t> held;
+    std::shared_ptr<const FieldData> tile;
+    for (const std::size_t i : order) {
+        if (tiles[i] && tiles[i] != held) {
+            tile.reset();  // before the next one is read
+            tile = data_->hold(*tiles[i]);
+            held = tiles[i];
+        }
+        samples[i] = tiles[i] ? data_->sampleIn(*tile, *held, points[i]) : data_->sample(points[i], std::nullopt);
+    }
+}
+
+float TiledField::distance(const glm::vec3& point) const {
+    return sample(point).distance;
+}
+
+bool TiledField::inside(const glm::vec3& point) const {
+    return sample(point).distance < 0;
+}
+
+// As FieldData::closestZero().
+ClosestPoint TiledField::closest(const glm::vec3& point, float maxDistance) const {
+    const FieldFrame& frame = data_->frame();
+    const glm::dvec3 local = (glm::dvec3(point) - frame.origin) * frame.perMetre;
+    if (!std::isfinite(local.x + local.y + local.z) || !(maxDistance >= 0)) return {};
+    const glm::dvec3 from = approachedPoint(frame, local);
+    const double reach = double(maxDistance) * frame.perMetre;
+    const auto nearest = nearestZero(*data_, from, from == local ? reach : std::numeric_limits<double>::infinity());
+    if (!nearest || glm::distance(local, nearest->position) > reach) return {};
+    const float distance = toFloat(glm::distance(local, nearest->position) * frame.voxel);
+    return {.distance = inside(point) ? -distance : distance,
+            .position = glm::vec3(nearest->position * frame.voxel + frame.origin),
+            .normal = glm::vec3(nearest->normal),
+            .found = true};
+}
+
+// As Field::raycast() without the mesh.
+std::optional<RayHit> TiledField::raycast(const Ray& ray) const {
+    if (!isRay(ray)) return std::nullopt;
+    const FieldFrame& frame = data_->frame();
+    const Path path = pathOf(ray);
+    if (const Sample start = sample(ray.origin); start.distance < 0)
+        return hitAtStart(start, ray.origin, path.direction);
+    const Path local{(path.origin - frame.origin) * frame.perMetre, path.direction, path.length * frame.perMetre};
+    const auto part = partIn(local, glm::dvec3(0), frame.extent());
+    if (!part) return std::nullopt;
+    const auto hit = firstInside(*data_, part->path);
+    if (!hit) return std::nullopt;
+    return RayHit{.distance = toFloat((part->from + hit->along) * frame.voxel),
+                  .position = glm::vec3(hit->position * frame.voxel + frame.origin),
+                  .normal = glm::vec3(hit->normal != glm::dvec3(0) ? hit->normal : -path.direction)};
+}
+
+float TiledField::voxelSize() const noexcept {
+    return data_->frame().voxelSize;
+}
+float TiledField::exteriorWidth() const noexcept {
+    return data_->frame().exteriorWidth;
+}
+float TiledField::interiorWidth() const noexcept {
+    return data_->frame().interiorWidth;
+}
+const Bounds& TiledField::bounds() const noexcept {
+    return data_->frame().bounds;
+}
+std::size_t TiledField::tileCount() const noexcept {
+    return data_->tileCount();
+}
+std::size_t TiledField::tilesRead() const {
+    return data_->tiles().reads();
+}
+std::size_t TiledField::memoryBytes() const {
+    return data_->memoryBytes();
+}
+
+}  // namespace bilayer

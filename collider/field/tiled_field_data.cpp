@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "collider/field/tiled_field_data.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include <bilayer/sdf/grids.h>
+#include "collider/field/outer_bound.h"
+#include "collider/field/surface_file.h"
+#include "sdf/base/openvdb.h"
+#include "sdf/grid/vdb_grids.h"
+
+namespace bilayer::detail {
+namespace {
+
+constexpr int side = FieldFrame::side;
+
+// Of a place along one axis, in the fixed point of samples. Unsigned: negative, huge and NaN coordinates are out of
+// range of any directory.
+std::uint32_t blockAt(double perMetre, double offset, float coordinate) {
+    const auto word = [](double fixed) { return std::uint32_t(std::bit_cast<std::uint64_t>(fixed) >> 32); };
+    return word(double(coordinate) * perMetre + offset) - word(FieldData::fixedPoint);
+}
+
+bool overlap(const PlacedTile& a, const PlacedTile& b, int margin) {
+    const glm::ivec3 reach(margin);
+    return glm::all(glm::lessThan(a.first - reach, b.first + side * b.blocks)) &&
+           glm::all(glm::lessThan(b.first, a.first + side * a.blocks + reach));
+}
+
+}  // namespace
+
+TiledFieldData::TiledFieldData(const std::filesystem::path& folder, std::size_t budget, Storage storage)
+    : manifest_(readTileManifest(folder)), storage_(storage) {
+    readSurface();
+    readFrame();
+    placeTiles();
+    std::vector<std::size_t> sizes;
+    for (std::size_t tile = 0; tile < tileCount(); ++tile) sizes.push_back(bytesOf(tile));
+    cache_ = std::make_unique<TileCache>(budget, std::move(sizes), [this](std::size_t tile) { return read(tile); });
+}
+
+std::size_t TiledFieldData::memoryBytes() const {
+    return sizeof *this + surface_.capacity() * sizeof(SurfaceBlock) +
+           tileCount() * (sizeof(TileRecord) + sizeof(PlacedTile)) + cache_->memoryBytes();
+}
+
+void TiledFieldData::readSurface() {
+    for (const TileRecord& record : manifest_.tiles) {
+        const std::size_t before = surface_.size();
+        if (!record.cells.path.empty()) {
+            record.cells.requireIntact();
+            readSurfaceBlocks(record.cells.path, surface_);
+        }
+        placed_.push_back(
+            {.first{}, .blocks{}, .lower{}, .upper{}, .shift{}, .surface = before, .surfaceEnd = surface_.size()});
+    }
+    if (surface_.empty()) throw std::invalid_argument("the field in tiles has no voxel in its band");
+}
+
+// Reads the smallest tile for what all tiles share.
+void TiledFieldData::readFrame() {
+    const auto count = [&](std::size_t tile) { return placed_[tile].surfaceEnd - placed_[tile].surface; };
+    std::optional<std::size_t> smallest;
+    glm::ivec3 lower(std::numeric_limits<int>::max()), upper(std::numeric_limits<int>::min());
+    for (std::size_t tile = 0; tile < tileCount(); ++tile) {
+        const TileRecord& record = manifest_.tiles[tile];
+        if (!record.hasBand) continue;
+        if (!smallest || count(tile) < count(*smallest)) smallest = tile;
+        lower = glm::min(lower, record.band.first);
+        upper = glm::max(upper, record.band.end - 1);
+    }
+    if (!smallest) throw std::invalid_argument("the field in tiles has no voxel in its band");
+    manifest_.tiles[*smallest].field.requireIntact();
+    const LevelSet tile(readTile(manifest_.tiles[*smallest].field.path).grids);
+    const openvdb::FloatGrid& grid = *tile.grids().distance;
+    const auto placeOf = [&](const glm::ivec3& voxel) {
+        const openvdb::Vec3d p = grid.indexToWorld(openvdb::Coord(voxel.x, voxel.y, voxel.z));
+        return glm::dvec3(p.x(), p.y(), p.z());
+    };
+    glm::ivec3 end(std::numeric_limits<int>::min());
+    first_ = glm::ivec3(std::numeric_limits<int>::max());
+    for (const SurfaceBlock& block : surface_) {
+        first_ = glm::min(first_, block.first);
+        end = glm::max(end, block.first + side);
+    }
+    frame_.voxel = grid.voxelSize()[0];
+    frame_.perMetre = 1 / frame_.voxel;
+    frame_.voxelSize = tile.voxelSize();
+    frame_.exteriorWidth = tile.exteriorWidth();
+    frame_.interiorWidth = tile.interiorWidth();
+    frame_.blocks = (end - first_) / side;
+    frame_.origin = placeOf(first_);
+    frame_.bounds = {glm::vec3(placeOf(lower)), glm::vec3(placeOf(upper))};
+    fixedOffset_ = FieldData::fixedPoint - frame_.origin * frame_.perMetre;
+}
+
+// The lower neighbours belong to a tile's directory: a point on the border may be rounded to either side.
+void TiledFieldData::placeTiles() {
+    const glm::ivec3 end = first_ + side * frame_.blocks;
+    for (std::size_t tile = 0; tile < tileCount(); ++tile) {
+        const BlockBox& box = manifest_.tiles[tile].box;
+        PlacedTile& placed = placed_[tile];
+        placed.first = glm::max(box.first - side, first_);
+        placed.blocks = glm::max((glm::min(box.end, end) - placed.first) / side, glm::ivec3(0));
+        placed.shift = glm::dvec3(placed.first - first_);
+        placed.lower = glm::dvec3(glm::max(box.first, first_) - first_);
+        placed.upper = glm::dvec3(glm::min(box.end, end) - first_);
+    }
+    for (int axis = 0; axis < 3; ++axis)
+        for (int i = 0; i < manifest_.counts[axis]; ++i) {
+            glm::ivec3 place(0);
+            place[axis] = i;
+            starts_[std::size_t(axis)].push_back((manifest_.tiles[manifest_.at(place)].box.first[axis] - first_[axis]) /
+                                                 side);
+        }
+}
+
+glm::ivec3 TiledFieldData::placeOf(const glm::ivec3& block) const {
+    glm::ivec3 place;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::vector<int>& starts = starts_[std::size_t(axis)];
+        place[axis] = int(std::upper_bound(starts.begin() + 1, starts.end(), block[axis]) - starts.begin()) - 1;
+    }
+    return place;
+}
+
+std::optional<std::size_t> TiledFieldData::tileOf(const glm::vec3& point) const {
+    glm::ivec3 block;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::uint32_t at = blockAt(frame_.perMetre, fixedOffset_[axis], point[axis]);
+        if (at >= std::uint32_t(frame_.blocks[axis])) return std::nullopt;
+        block[axis] = int(at);
+    }
+    return tileAt(placeOf(block));
+}
+
+Sample TiledFieldData::sample(const glm::vec3& point, std::optional<std::size_t> tile) const {
+    if (!tile) return {.distance = boundOutside(frame_, (glm::dvec3(point) - frame_.origin) * frame_.perMetre)};
+    return sampleIn(*hold(*tile), *tile, point);
+}
+
+// In voxels, the step from the field's first voxel to the tile's is exact.
+Sample TiledFieldData::sampleIn(const FieldData& data, std::size_t tile, const glm::vec3& point) const {
+    const glm::dvec3 local = (glm::dvec3(point) - frame_.origin) * frame_.perMetre;
+    return data.kernels.sampleInPart(data, {point, local - placed_[tile].shift});
+}
+
+// As FieldData::memoryBytes() will be, but for the rounding of allocations.
+std::size_t TiledFieldData::bytesOf(std::size_t tile) const {
+    const PlacedTile& placed = placed_[tile];
+    const std::size_t entries =
+        std::size_t(placed.blocks.x) * std::size_t(placed.blocks.y) * std::size_t(placed.blocks.z);
+    const std::size_t value = storage_ == Storage::float32 ? sizeof(float) : sizeof(std::int16_t);
+    return sizeof(FieldData) + entries * (sizeof(std::int32_t) + Clearance::blockParts) +
+           (placed.surfaceEnd - placed.surface) * (FieldFrame::blockFloats * value + Clearance::blockParts);
+}
+
+std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
+    const TileRecord& record = manifest_.tiles[tile];
+    Grids grids;
+    if (record.field.path.empty()) {
+        grids.distance = openvdb::FloatGrid::create(record.inside ? -frame_.interiorWidth : frame_.exteriorWidth);
+    } else {
+        record.field.requireIntact();
+        const TileGrids read = readTile(record.field.path);
+        grids.distance = openvdb::FloatGrid::create(withBorder(read.grids->distance->tree(), read.border->tree()));
+    }
+    const openvdb::FloatGrid::Ptr grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(grids.distance);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(frame_.voxel));
+    const std::vector<SurfaceBlock> surface = surfaceAround(placed_[tile]);
+    const LayoutPart part{placed_[tile].first, placed_[tile].blocks, surface};
+    return std::make_shared<const FieldData>(FieldLayout(frame_, grids, part, storage_));
+}
+
+std::vector<SurfaceBlock> TiledFieldData::surfaceAround(const PlacedTile& tile) const {
+    std::vector<SurfaceBlock> around;
+    for (const PlacedTile& other : placed_)
+        if (overlap(tile, other, side * clearanceReach))
+            around.insert(around.end(), surface_.begin() + std::ptrdiff_t(other.surface),
+                          surface_.begin() + std::ptrdiff_t(other.surfaceEnd));
+    return around;
+}
+
+}  // namespace bilayer::detail
