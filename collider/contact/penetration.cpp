@@ -33,6 +33,20 @@ constexpr float maxDeepening = 0.1f, maxDepth = testDepth + maxDeepening;
 // before it enters. Where the surface bends in between, the next step's contacts would miss the surface that the body
 // met, and it would be stopped in the same place again.
 constexpr float maxReturn = 0.5f;
+// A body that goes back to less than this from its start stops where the test point enters [voxels]. At its start,
+// contacts would miss the surface ahead, and it would be stopped there in each step.
+constexpr float minAdvance = 0.05f;
+// An open surface that cuts a body up to this far below a test point has been passed by the point [voxels].
+constexpr float maxPassedDepth = 1;
+// ... where the body is thick enough: down there its surface is at least this far away. Otherwise the surface may just
+// touch the other side of a thin body [voxels].
+constexpr float minCoreDepth = 0.35f;
+// A point that passes an open surface with its body ahead of it leaves that surface: a point enters only where the
+// cosine of the angle between its normal and that of the surface is at most this. The margin is for faces that pass
+// edgewise.
+constexpr float maxFacing = -0.05f;
+// A point that is moved back to an open surface starts this far in front of it, so that it enters again [voxels].
+constexpr float startHeight = 0.01f;
 // Arcs are approximated by chords of this angle [rad]; their error is its square over eight, in fractions of the
 // radius.
 constexpr float maxChordAngle = 0.1f;
@@ -75,9 +89,12 @@ class PointSweep {
         : surface_(surface), transforms_(transforms), voxel_(voxel), scale_(transforms.front().scale) {}
 
     /// Follows the surface points of a collider.
-    void follow(const SurfacePoints& points) {
+    void follow(const Collider& collider) {
+        body_ = &collider.field();
         const auto reject = [&](const glm::vec3& centre, float radius) { return !comesNear(centre, scale_ * radius); };
-        points.visit(reject, [&](std::uint32_t, const SurfacePoint& point) { follow({point.position, point.normal}); });
+        collider.data().points().visit(reject, [&](std::uint32_t, const SurfacePoint& point) {
+            follow({point.position, point.normal});
+        });
     }
 
     /// Follows the vertices and edges of a convex body, grown by its radius.
@@ -113,32 +130,33 @@ class PointSweep {
         const float smaller = std::max(scale_ * radius - testDepth * voxel_, 0.f), shrunk = scale_ * radius - smaller,
                     inward = testDepth * voxel_ - shrunk;
         const glm::vec3 inner = point - inward / scale_ * outward;
-        glm::vec3 from = transforms_.front()(inner), offset(0);
         // a point that starts inside may move on at its depth
-        const bool startsInside = surface_.entry(from, from, smaller).has_value();
-        if (startsInside) {
-            const auto out = surface_.depenetration(from, smaller);
-            if (!out) return;
-            offset = *out;
-        }
-        from += offset;
+        const auto out = wayOut(inner, outward, smaller);
+        if (!out) return;
+        const glm::vec3 offset = *out;
+        const bool startsInside = offset != glm::vec3(0);
+        glm::vec3 from = transforms_.front()(inner) + offset;
         std::optional<SurfaceEntry> entered;
         for (std::size_t i = 0; i + 1 < transforms_.size() && transforms_[i].time < first_.time; ++i) {
             const glm::vec3 to = transforms_[i + 1](inner) + offset;
-            if (!entered) entered = surface_.entry(from, to, smaller);
+            const glm::vec3 ahead = transforms_[i].rotated(outward);
+            if (!entered) {
+                entered = surface_.entry(from, to, smaller);
+                if (entered && leaves(ahead, *entered)) entered.reset();
+            }
             if (entered) {
                 const auto depth = [&](const glm::vec3& at) {
                     return glm::dot(entered->position - at, entered->normal) + smaller;
                 };
                 const float before = depth(from), after = depth(to);
                 // where the point itself touches
-                const float facing = glm::dot(transforms_[i].rotated(outward), entered->normal),
-                            touching = std::min(inward * facing, 0.f) - shrunk;
+                const float touching = std::min(inward * glm::dot(ahead, entered->normal), 0.f) - shrunk;
                 if (after > (startsInside ? maxDeepening * voxel_ : maxDepth * voxel_ + touching)) {
-                    const float descent = after - before, back = maxReturn * voxel_ / glm::distance(from, to);
-                    float part = std::max(touching - before, -before - back * descent) / descent;
-                    // there is no path before the start to go back on: the body stops where the point enters
-                    if (i == 0 && part < 0) part = std::max(-before / descent, 0.f);
+                    const float length = glm::distance(from, to), entering = -before / (after - before);
+                    float part =
+                        std::max((touching - before) / (after - before), entering - maxReturn * voxel_ / length);
+                    // there is too little path to go back on: the body stops where the point enters
+                    if (i == 0 && part * length < minAdvance * voxel_) part = std::max(entering, 0.f);
                     const float time = transforms_[i].time + part * (transforms_[i + 1].time - transforms_[i].time);
                     first_ = {std::clamp(time, 0.f, first_.time), entered->position - offset, entered->normal};
                     return;
@@ -147,6 +165,35 @@ class PointSweep {
             }
             from = to;
         }
+    }
+
+    /// Whether a point passes an open surface with its body ahead of it.
+    /// @param outward  normal of its body
+    bool leaves(const glm::vec3& outward, const SurfaceEntry& entry) const {
+        return std::is_same_v<Surface, SheetSurface> && glm::dot(outward, entry.normal) > maxFacing;
+    }
+
+    /// The displacement to the surface of a point that starts inside; zero if it starts outside, nothing if unknown.
+    /// @param inner    the test point
+    /// @param outward  normal of its body
+    std::optional<glm::vec3> wayOut(const glm::vec3& inner, const glm::vec3& outward, float radius) const {
+        if constexpr (std::is_same_v<Surface, SheetSurface>) {
+            return backThroughSheet(inner, outward);
+        } else {
+            const glm::vec3 from = transforms_.front()(inner);
+            if (surface_.entry(from, from, radius)) return surface_.depenetration(from, radius);
+            return glm::vec3(0);
+        }
+    }
+
+    /// The displacement to an open surface of a point that has passed it, so that the surface cuts the body right below
+    /// the point. Zero if it does not.
+    glm::vec3 backThroughSheet(const glm::vec3& inner, const glm::vec3& outward) const {
+        const glm::vec3 core = inner - maxPassedDepth * voxel_ / scale_ * outward;
+        const glm::vec3 from = transforms_.front()(core), to = transforms_.front()(inner);
+        const auto cut = surface_.entry(from, to, 0);
+        if (!cut || scale_ * body_->distance(core) > -minCoreDepth * voxel_) return glm::vec3(0);
+        return (glm::dot(cut->position - to, cut->normal) + startHeight * voxel_) * cut->normal;
     }
 
     /// Follows the points of an edge, ends excluded.
@@ -183,6 +230,7 @@ class PointSweep {
     const Surface& surface_;
     const std::vector<StepTransform>& transforms_;
     float voxel_, scale_;
+    const Field* body_ = nullptr;  ///< that the points belong to, if it is a collider
     Penetration first_;
 };
 
@@ -212,7 +260,7 @@ Penetration firstOf(const SweptShape& points, const SweptShape& other, float vox
         PointSweep sweep(surface, transforms, voxel / other.scale);
         const float ownVoxel = voxel / points.scale;
         if (const auto* collider = std::get_if<Collider>(&shape))
-            sweep.follow(collider->data().points());
+            sweep.follow(*collider);
         else if constexpr (std::is_same_v<decltype(surface), const FieldSurface>) {
             if (const auto* convex = std::get_if<Convex>(&shape)) sweep.follow(*convex, ownVoxel);
             if (const auto* sheet = std::get_if<TriangleSheet>(&shape))

@@ -3,7 +3,7 @@
 //
 // - std::optional<SurfaceEntry> entry(from, to, radius): where a sphere enters on a straight path; its start if inside;
 // - std::optional<glm::vec3> depenetration(point, radius): the displacement to the surface of a sphere that is inside;
-//   none if unknown;
+//   none if unknown. An open surface has no inside and no such function;
 // - bool isNear(from, to, radius): whether a sphere may come near on a straight path.
 //
 // Only fields are entered by spheres with a radius, and by points where they are at the start.
@@ -74,7 +74,6 @@ class SheetSurface {
     SheetSurface(const TriangleSheet& sheet, float) : sheet_(sheet) {}
 
     std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
-    std::optional<glm::vec3> depenetration(const glm::vec3&, float) const { return std::nullopt; }
     bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const;
 
   private:

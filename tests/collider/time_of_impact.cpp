@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Times of impact of moving bodies against many distances along their motion, each by brute force over all pairs of
 // triangles in double precision.
+#define GLM_ENABLE_EXPERIMENTAL  // for the rotation between two vectors
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/gtx/quaternion.hpp>
 #include <limits>
 #include <stdexcept>
 
@@ -34,6 +36,15 @@ Placed after(const Placed& body, double fraction) {
             {body.pose.position + float(fraction) * body.motion.displacement,
              glm::quat(spin * glm::dquat(body.pose.rotation))},
             body.scale};
+}
+
+/// A square of two triangles at z = 0.
+TriangleSheet squareSheet() {
+    return {[](const Bounds& box, const TriangleSheet::Visitor& visitor) {
+        if (box.lower.z > 0 || box.upper.z < 0) return;
+        visitor({glm::vec3(-9, -9, 0), {9, -9, 0}, {9, 9, 0}}, 0);
+        visitor({glm::vec3(-9, -9, 0), {9, 9, 0}, {-9, 9, 0}}, 1);
+    }};
 }
 
 Pose randomPose(Random& random, float distance) {
@@ -142,11 +153,7 @@ TEST_CASE("Bodies in contact rest, slide and part without penetration, and penet
     const float half = 0.3f;
     const Collider block = colliderOf(shapes::box({half, half, half}));
     const float voxel = block.field().voxelSize();
-    const TriangleSheet floor{[](const Bounds& box, const TriangleSheet::Visitor& visitor) {
-        if (box.lower.z > 0 || box.upper.z < 0) return;
-        visitor({glm::vec3(-9, -9, 0), {9, -9, 0}, {9, 9, 0}}, 0);
-        visitor({glm::vec3(-9, -9, 0), {9, 9, 0}, {-9, 9, 0}}, 1);
-    }};
+    const TriangleSheet floor = squareSheet();
     const ContactShape box = ContactShape::box({9, 9, 1}), field(colliderOf(shapes::box({3, 3, 1})));
     const PlacedShape grounds[] = {{field, {{0, 0, -1}}},
                                    {box, {{0, 0, -1}}},
@@ -184,4 +191,82 @@ TEST_CASE("Bodies in contact rest, slide and part without penetration, and penet
     CHECK(timeOfImpact(body, grounds[0]).fraction == 0);
     // two shapes without a field
     CHECK_THROWS_AS(timeOfImpact(grounds[1], grounds[2], {.penetration = true}), std::invalid_argument);
+}
+
+TEST_CASE("Bodies that have passed a surface by less than a voxel move on along it, out of it, but not deeper") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float half = 0.3f;
+    const Collider block = colliderOf(shapes::box({half, half, half}));
+    const float voxel = block.field().voxelSize();
+    const TriangleSheet floor = squareSheet();
+    const PlacedShape grounds[] = {{ContactShape::plane({0, 0, 1}, 0)}, {ContactShape::triangles(floor)}};
+    for (const PlacedShape& ground : grounds)
+        for (int round = 0; round < 40; ++round) {
+            // on a face, an edge or a vertex
+            const glm::vec3 lowest = glm::normalize(glm::vec3(round % 3 > 1, round % 3 > 0, 1));
+            PlacedShape body{ContactShape(block)};
+            body.pose.rotation = glm::rotation(lowest, glm::vec3(0, 0, -1));
+            const float depth = voxel * float(random(0.4, 0.8));
+            body.pose.position.z = half * (lowest.x + lowest.y + lowest.z) - depth;
+            CAPTURE(&ground - grounds, round, depth / voxel);
+            const auto penetrates = [&](const glm::vec3& displacement) {
+                body.motion.displacement = displacement;
+                return timeOfImpact(body, ground, {.penetration = true});
+            };
+            const auto along = float(random(0, 6));
+            const glm::vec3 sideways = 1.5f * glm::vec3(std::cos(along), std::sin(along), 0);
+            CHECK_FALSE(penetrates(sideways).found);
+            CHECK_FALSE(penetrates(sideways + glm::vec3(0, 0, 1)).found);
+            const float down = float(random(0.2, 100)) * voxel;
+            const Impact impact = penetrates(sideways - glm::vec3(0, 0, down));
+            REQUIRE(impact.found);
+            CHECK(impact.fraction * down <= 0.1f * voxel);
+            CHECK(impact.distance.normal.z == Approx(1).margin(1e-3));
+        }
+    // a thin plate leaves a sheet that it rests on, or that its lower side has passed
+    for (const float thickness : {0.7f, 1.f, 1.5f, 2.f, 3.f})
+        for (const float depth : {-0.1f, 0.1f, 0.3f}) {
+            const Collider plate(shapes::box({half, half, 0.5f * thickness * voxel}),
+                                 build(shapes::box({half, half, 0.5f * thickness * voxel}), {.voxelSize = voxel}));
+            PlacedShape body{ContactShape(plate), {{0.3f, 0.1f, (0.5f * thickness - depth) * voxel}}};
+            CAPTURE(thickness, depth);
+            body.motion.displacement = {1, 0, 1};
+            CHECK_FALSE(timeOfImpact(body, grounds[1], {.penetration = true}).found);
+        }
+}
+
+TEST_CASE("A body that slides towards a crease of triangles is stopped in front of it a few times at most") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float half = 0.3f;
+    const Collider block = colliderOf(shapes::box({half, half, half}));
+    const float voxel = block.field().voxelSize();
+    for (int round = 0; round < 200; ++round) {
+        // flat for negative x, a slope for positive x
+        const float rise = 9 * std::tan(float(random(0.1, 0.4)));
+        const Triangle triangles[] = {{glm::vec3(-9, -9, 0), {0, -9, 0}, {0, 9, 0}},
+                                      {glm::vec3(-9, -9, 0), {0, 9, 0}, {-9, 9, 0}},
+                                      {glm::vec3(0, -9, 0), {9, -9, rise}, {9, 9, rise}},
+                                      {glm::vec3(0, -9, 0), {9, 9, rise}, {0, 9, 0}}};
+        const TriangleSheet sheet{[&](const Bounds&, const TriangleSheet::Visitor& visitor) {
+            for (std::uint64_t i = 0; i < 4; ++i) visitor(triangles[i], i);
+        }};
+        const PlacedShape ground{ContactShape::triangles(sheet)};
+        PlacedShape body{ContactShape(block)};
+        const float depth = float(random(0, 0.8)), height = float(random(0, 0.2));
+        body.pose.position = {-half - voxel * float(random(0.1, 3)), 0, half - depth * voxel};
+        body.motion.displacement = voxel * glm::vec3(random(4, 8), 0, height);
+        CAPTURE(round, rise, depth);
+        int stops = 0;
+        for (float fraction = 0; fraction < 1 && stops < 9; ++stops) {
+            const Impact impact = timeOfImpact(body, ground, {.penetration = true});
+            if (body.pose.position.x + half > 0) break;
+            fraction = impact.found ? impact.fraction : 1;
+            body.pose.position += fraction * body.motion.displacement;
+        }
+        CHECK(stops <= 3);
+    }
 }
