@@ -56,6 +56,13 @@ Sampler singleSamples(const std::string& name, const Field& field) {
             }};
 }
 
+Sampler keptBlockSamples(const std::string& name, const Field& field) {
+    return {name, [field](std::span<const glm::vec3> points, std::span<Sample> samples) {
+                FieldSampler sampler(field);
+                for (std::size_t i = 0; i < points.size(); ++i) samples[i] = sampler.sample(points[i]);
+            }};
+}
+
 Sampler batchedSamples(const std::string& name, const Field& field) {
     return {name,
             [field](std::span<const glm::vec3> points, std::span<Sample> samples) { field.sample(points, samples); }};
@@ -231,8 +238,10 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
     const auto samples = contest<glm::vec3, Sample>(
         "Value and gradient",
         {openvdbSampler(grid), openvdbStencil(grid), openvdbCell(grid), nanovdb.sampler(),
-         singleSamples(ours + " sample", field), batchedSamples(ours + " sample, batched", field),
-         singleSamples(ours + " sample, 16 bits", small), batchedSamples(ours + " sample, 16 bits, batched", small)},
+         singleSamples(ours + " sample", field), keptBlockSamples(ours + " FieldSampler", field),
+         batchedSamples(ours + " sample, batched", field), singleSamples(ours + " sample, 16 bits", small),
+         keptBlockSamples(ours + " FieldSampler, 16 bits", small),
+         batchedSamples(ours + " sample, 16 bits, batched", small)},
         points, subject, options, ratios);
     const nlohmann::json floor = floors(levelSet, field.memoryBytes(), points, options);
     const auto nearest = contest<glm::vec3, ClosestPoint>(

@@ -3,7 +3,10 @@
 // independent of OpenVDB. A TiledField samples a field that does not fit into memory.
 #pragma once
 
+#include <array>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <glm/vec3.hpp>
 #include <limits>
@@ -18,8 +21,19 @@
 namespace bilayer {
 
 namespace detail {
+
 struct FieldData;
 class TiledFieldData;
+
+using Floats [[gnu::vector_size(16)]] = float;
+
+/// The block that a FieldSampler sampled last.
+struct LastBlock {
+    /// The upper words of fixed-point places in it, along x, y, y, z. Without a block: no place has two different y.
+    alignas(16) std::array<std::uint32_t, 4> place{0, 0, 1, 0};
+    const void* first = nullptr;  ///< its first voxel
+};
+
 }  // namespace detail
 
 /// How a field stores its distances.
@@ -152,6 +166,34 @@ class Field {
   private:
     std::shared_ptr<const detail::FieldData> data_;
     Sample (*sample_)(const detail::FieldData&, const glm::vec3&) noexcept;  // the fastest for this processor
+};
+
+/// Samples a field point by point. Faster than Field::sample() where successive points are near each other, since it
+/// keeps the block of voxels that it sampled last. A light object for one thread at a time: create one per thread. It
+/// refers to the field's memory, so the field or a copy of it must outlive it.
+class FieldSampler {
+  public:
+    explicit FieldSampler(const Field& field) noexcept;
+    explicit FieldSampler(Field&&) = delete;
+
+    /// Distance and gradient at a point in field coordinates [m]. Equals Field::sample() bit for bit.
+    Sample sample(const glm::vec3& point) noexcept {
+        const detail::Floats found = sampleInBand_(*data_, last_, point);
+        // tests the bits: compilers may remove tests for NaN on request
+        if (std::bit_cast<std::uint32_t>(found[0]) << 1 > infinityBits << 1) [[unlikely]]
+            return sampleAnywhere(point);
+        return {.distance = found[0], .gradient = {found[1], found[2], found[3]}, .inBand = true};
+    }
+
+  private:
+    static constexpr std::uint32_t infinityBits = 0x7f800000;
+
+    Sample sampleAnywhere(const glm::vec3& point) const noexcept;
+
+    const detail::FieldData* data_;
+    /// Distance and gradient in the band, NaN elsewhere. The fastest for this processor.
+    detail::Floats (*sampleInBand_)(const detail::FieldData&, detail::LastBlock&, const glm::vec3&) noexcept;
+    detail::LastBlock last_;
 };
 
 /// A field in tiles, as `bilayer build --tiles` writes it. A tile is read when a query falls into it. The tiles that

@@ -28,7 +28,6 @@ inline float toFloat(double length) {
 
 // The compiler's own vector types: Highway has no fixed-size vectors for the baseline instruction set.
 using Doubles [[gnu::vector_size(16)]] = double;
-using Floats [[gnu::vector_size(16)]] = float;
 using Ints [[gnu::vector_size(16)]] = std::int32_t;
 
 struct FieldData;
@@ -46,6 +45,7 @@ struct SampleKernels {
     Sample (*samplePoint)(const FieldData&, const glm::vec3& point) noexcept;
     Sample (*sampleWithin)(const FieldData&, const glm::vec3& point, float gradientReach) noexcept;
     Sample (*sampleInPart)(const FieldData&, const PartPoint& point) noexcept;
+    Floats (*sampleInBand)(const FieldData&, LastBlock&, const glm::vec3& point) noexcept;  ///< of FieldSampler
     void (*sampleMany)(const FieldData&, std::span<const glm::vec3> points, Sample*) noexcept;
 };
 

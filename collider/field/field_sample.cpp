@@ -50,8 +50,8 @@ HWY_INLINE glm::dvec3 localOf(const FieldData&, const glm::dvec3& local) {
 HWY_INLINE glm::dvec3 localOf(const FieldData&, const PartPoint& point) {
     return point.local;
 }
-HWY_INLINE FixedPlace placeOf(const FieldData& field, const PartPoint& point) {
-    return placeOf(field, point.point);
+HWY_INLINE FixedNumbers numbersOf(const FieldData& field, const PartPoint& point) {
+    return numbersOf(field, point.point);
 }
 
 /// Samples a cell that is partly outside the band.
@@ -92,21 +92,34 @@ HWY_INLINE void prefetchAlong(const Value* v) {
     for (const int steps : {rows, rows + xStep, blocks, blocks + rows}) prefetch(v, steps);
 }
 
+/// The block of a place in the directory, or a negative number: none is stored there.
+HWY_INLINE std::int32_t blockAt(const FieldData& field, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    return field.directory[x * field.lanes.xBlocks + y * std::uint32_t(field.blocks.z) + z];
+}
+
+/// Whether a block is outside the directory, along one axis or more.
+HWY_INLINE bool isBeyond(const FieldData& field, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    return HWY_UNLIKELY(x >= std::uint32_t(field.blocks.x)) || HWY_UNLIKELY(y >= std::uint32_t(field.blocks.y)) ||
+           HWY_UNLIKELY(z >= std::uint32_t(field.blocks.z));
+}
+
+/// The index of a cell's first voxel in its block.
+HWY_INLINE std::size_t voxelOf(const FixedPlace& place) {
+    const auto inBlock = [&](int axis) { return place.inBlock[axis] >> fractionBits; };
+    return (inBlock(0) * yStep + inBlock(1)) * yStep + inBlock(2);
+}
+
 /// @param limited  whether the gradient is computed only where the distance is at most `gradientReach`
 /// @param point    glm::vec3 in field coordinates [m], glm::dvec3 from the directory's first voxel [voxels], or both
 template <class Value, bool limited, class Point>
 HWY_INLINE Sample sampleOne(const FieldData& field, const Point& point, float gradientReach) {
-    const FixedPlace place = placeOf(field, point);
+    const FixedPlace place = placeOf(field, numbersOf(field, point));
     const auto& [x, y, z] = place.block;
-    const auto beyond = [&](int axis) { return place.block[axis] >= std::uint32_t(field.blocks[axis]); };
-    if (HWY_UNLIKELY(beyond(0)) || HWY_UNLIKELY(beyond(1)) || HWY_UNLIKELY(beyond(2)))
-        return sampleOutside(field, point);
-    const std::int32_t block = field.directory[x * field.lanes.xBlocks + y * std::uint32_t(field.blocks.z) + z];
+    if (isBeyond(field, x, y, z)) return sampleOutside(field, point);
+    const std::int32_t block = blockAt(field, x, y, z);
     if (HWY_UNLIKELY(block < 0)) return sampleEmpty(field, block, point);
 
-    const auto inBlock = [&](int axis) { return place.inBlock[axis] >> fractionBits; };
-    const std::size_t voxel =
-        std::size_t(block) * FieldFrame::blockFloats + ((inBlock(0) * yStep + inBlock(1)) * yStep + inBlock(2));
+    const std::size_t voxel = std::size_t(block) * FieldFrame::blockFloats + voxelOf(place);
     const Value* const v = valuesOf<Value>(field) + voxel;
     const CellLanes<Floats> cell = loadCell(v);
     prefetchAlong(v);
@@ -114,6 +127,41 @@ HWY_INLINE Sample sampleOne(const FieldData& field, const Point& point, float gr
     if (HWY_UNLIKELY(cell.beyond || std::isnan(found[0]))) return sampleNextToBand(field, voxel, place.fraction, point);
     if (limited && HWY_UNLIKELY(!(found[0] <= gradientReach))) return sampleOf(Floats{found[0]});
     return sampleOf(found);
+}
+
+/// Finds the block of a place. If it is stored, it becomes the last block, and its first voxel is returned.
+/// @param upper  of FixedNumbers
+template <class Value>
+HWY_INLINE const Value* enterBlock(const FieldData& field, LastBlock& last, Words upper) {
+    const Words place = upper - firstBlock;
+    const std::uint32_t x = place[0], y = place[1], z = place[3];
+    if (isBeyond(field, x, y, z)) return nullptr;
+    const std::int32_t block = blockAt(field, x, y, z);
+    if (HWY_UNLIKELY(block < 0)) return nullptr;
+    const Value* const first = valuesOf<Value>(field) + std::size_t(block) * FieldFrame::blockFloats;
+    std::memcpy(last.place.data(), &upper, sizeof upper);
+    last.first = first;
+    return first;
+}
+
+/// The distance and its gradient at a point in the band, elsewhere NaN.
+template <class Value>
+Floats sampleInBand(const FieldData& field, LastBlock& last, const glm::vec3& point) noexcept {
+    constexpr Floats none{std::numeric_limits<float>::quiet_NaN()};
+    const FixedNumbers numbers = numbersOf(field, point);
+    const FixedPlace place = placeOf(field, numbers);
+    const std::size_t voxel = voxelOf(place);
+    auto first = static_cast<const Value*>(last.first);
+    if (HWY_LIKELY(equal(numbers.upper(), load<Words>(last.place.data())))) {
+        prefetchAlong(first + voxel);
+    } else {
+        // perhaps random points, which need nothing nearby
+        first = enterBlock<Value>(field, last, numbers.upper());
+        if (HWY_UNLIKELY(!first)) return none;
+    }
+    const CellLanes<Floats> cell = loadCell(first + voxel);
+    const Floats found = interpolate(cell, place.fraction) * field.lanes.scales;
+    return HWY_UNLIKELY(cell.beyond) ? none : found;
 }
 
 template <class Value, class Point>
@@ -226,8 +274,9 @@ void sampleMany(const FieldData& field, std::span<const glm::vec3> points, Sampl
 }
 
 template <class Value>
-constexpr SampleKernels kernelsOf{sampleWithin<Value, glm::dvec3>, samplePoint<Value, glm::vec3>,
-                                  sampleWithin<Value, glm::vec3>, samplePoint<Value, PartPoint>, sampleMany<Value>};
+constexpr SampleKernels kernelsOf{
+    sampleWithin<Value, glm::dvec3>, samplePoint<Value, glm::vec3>, sampleWithin<Value, glm::vec3>,
+    samplePoint<Value, PartPoint>,   sampleInBand<Value>,           sampleMany<Value>};
 
 const SampleKernels& kernels(Storage storage) {
     return storage == Storage::float32 ? kernelsOf<float> : kernelsOf<std::int16_t>;
@@ -250,6 +299,13 @@ const SampleKernels& detail::sampleKernels(Storage storage) {
 
 Sample Field::sampleWithin(const glm::vec3& point, float reach) const noexcept {
     return data_->kernels.sampleWithin(*data_, point, reach);
+}
+
+FieldSampler::FieldSampler(const Field& field) noexcept
+    : data_(&field.data()), sampleInBand_(data_->kernels.sampleInBand) {}
+
+Sample FieldSampler::sampleAnywhere(const glm::vec3& point) const noexcept {
+    return data_->kernels.samplePoint(*data_, point);
 }
 
 float Field::distance(const glm::vec3& point) const noexcept {

@@ -40,29 +40,42 @@ HWY_INLINE Floats fractionOf(const FieldData& field, Words inBlock) {
            field.lanes.fractionUnit;
 }
 
-/// From fixed-point numbers in the lower bits of doubles. The blocks are computed in general-purpose registers, in
-/// parallel with the vector units, which the interpolation keeps busy.
-HWY_INLINE FixedPlace placeOf(const FieldData& field, Doubles xy, Doubles yz) {
-    const auto words = [](double fixed) { return std::bit_cast<std::uint64_t>(fixed); };
-    const std::uint64_t x = words(xy[0]), y = words(yz[0]), z = words(yz[1]);
-    return {
-        {std::uint32_t(x >> 32) - firstBlock, std::uint32_t(y >> 32) - firstBlock, std::uint32_t(z >> 32) - firstBlock},
-        {std::uint32_t(x), std::uint32_t(y), std::uint32_t(z)},
-        fractionOf(field,
-                   __builtin_shufflevector(reinterpret_cast<Words>(xy), reinterpret_cast<Words>(yz), 0, 2, 4, 6))};
-}
+/// A place as fixed-point numbers in the lower bits of doubles.
+struct FixedNumbers {
+    Doubles xy, yz;
+
+    /// The upper words, along x, y, y, z: the block.
+    HWY_INLINE Words upper() const {
+        return __builtin_shufflevector(reinterpret_cast<Words>(xy), reinterpret_cast<Words>(yz), 1, 3, 5, 7);
+    }
+    /// The lower words, along x, y, y, z: the place in the block.
+    HWY_INLINE Words lower() const {
+        return __builtin_shufflevector(reinterpret_cast<Words>(xy), reinterpret_cast<Words>(yz), 0, 2, 4, 6);
+    }
+};
 
 /// Two loads of eight bytes give [x, y] and [y, z].
-HWY_INLINE FixedPlace placeOf(const FieldData& field, const glm::vec3& point) {
+HWY_INLINE FixedNumbers numbersOf(const FieldData& field, const glm::vec3& point) {
     const Doubles xy{load<double>(&point.x), 0}, yz{load<double>(&point.y), 0};
-    return placeOf(field, lowerAsDoubles(reinterpret_cast<Floats>(xy)) * field.lanes.perMetre + field.lanes.offsetXy,
-                   lowerAsDoubles(reinterpret_cast<Floats>(yz)) * field.lanes.perMetre + field.lanes.offsetYz);
+    return {lowerAsDoubles(reinterpret_cast<Floats>(xy)) * field.lanes.perMetre + field.lanes.offsetXy,
+            lowerAsDoubles(reinterpret_cast<Floats>(yz)) * field.lanes.perMetre + field.lanes.offsetYz};
 }
 
 /// @param local  from the directory's first voxel [voxels]
-HWY_INLINE FixedPlace placeOf(const FieldData& field, const glm::dvec3& local) {
+HWY_INLINE FixedNumbers numbersOf(const FieldData&, const glm::dvec3& local) {
     constexpr double zero = FieldData::fixedPoint;
-    return placeOf(field, Doubles{local.x, local.y} + zero, Doubles{local.y, local.z} + zero);
+    return {Doubles{local.x, local.y} + zero, Doubles{local.y, local.z} + zero};
+}
+
+/// The blocks are computed in general-purpose registers, in parallel with the vector units, which the interpolation
+/// keeps busy.
+HWY_INLINE FixedPlace placeOf(const FieldData& field, const FixedNumbers& numbers) {
+    const auto words = [](double fixed) { return std::bit_cast<std::uint64_t>(fixed); };
+    const std::uint64_t x = words(numbers.xy[0]), y = words(numbers.yz[0]), z = words(numbers.yz[1]);
+    return {
+        {std::uint32_t(x >> 32) - firstBlock, std::uint32_t(y >> 32) - firstBlock, std::uint32_t(z >> 32) - firstBlock},
+        {std::uint32_t(x), std::uint32_t(y), std::uint32_t(z)},
+        fractionOf(field, numbers.lower())};
 }
 
 /// Four places along one axis.

@@ -52,6 +52,16 @@ HWY_INLINE FourDoubles asDoubles(Floats v) {
 #endif
 }
 
+HWY_INLINE bool equal(Words a, Words b) {
+#if HWY_ARCH_X86
+    return __builtin_ia32_movmskps(reinterpret_cast<Floats>(a == b)) == 0xf;
+#else
+    using Long [[gnu::vector_size(16)]] = std::uint64_t;
+    const Long differences = reinterpret_cast<Long>(a ^ b);
+    return (differences[0] | differences[1]) == 0;
+#endif
+}
+
 // The lower or upper halves, and the even or odd lanes, of two vectors, in groups of four lanes.
 HWY_INLINE Floats lowerHalves(Floats a, Floats b) {
     return __builtin_shufflevector(a, b, 0, 1, 4, 5);

@@ -51,6 +51,15 @@ Sampler makeBatched(const LevelSet& levelSet) {
     };
 }
 
+Sampler makeFieldSampler(const LevelSet& levelSet) {
+    return [field = Field(levelSet)](std::span<const glm::vec3> points) {
+        FieldSampler sampler(field);
+        std::vector<Sample> samples;
+        for (const glm::vec3& p : points) samples.push_back(sampler.sample(p));
+        return samples;
+    };
+}
+
 // Points in a field's box and around it, some of them not finite.
 std::vector<glm::vec3> pointsAround(Random& random, std::size_t count) {
     std::vector<glm::vec3> points;
@@ -149,6 +158,59 @@ TEST_CASE("batches answer as single samples do") {
     checkNarrowBand(makeBatched);
     checkNowhere(makeBatched);
     checkFarFromOrigin(makeBatched);
+}
+
+TEST_CASE("a field sampler answers as single samples do") {
+    checkInBand(makeFieldSampler);
+    checkVoxelCentres(makeFieldSampler);
+    checkBeyondBand(makeFieldSampler);
+    checkNarrowBand(makeFieldSampler);
+    checkNowhere(makeFieldSampler);
+    checkFarFromOrigin(makeFieldSampler);
+}
+
+TEST_CASE("a field sampler's samples are the field's, whatever block it keeps") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const Storage storage : {Storage::float32, Storage::fixed16}) {
+        const Field field(levelSetOf(torusSolid(0.35, 0.13), h), {.storage = storage});
+        const Field other(levelSetOf(sphereSolid(0.4), h), {.storage = storage});
+        FieldSampler sampler(field), otherSampler(other);
+        int inBand = 0;
+        const auto check = [&](const glm::vec3& p) {
+            CAPTURE(p.x, p.y, p.z);
+            const Sample expected = field.sample(p);
+            REQUIRE(sameBits(sampler.sample(p), expected));
+            REQUIRE(sameBits(otherSampler.sample(p), other.sample(p)));
+            inBand += expected.inBand;
+        };
+        for (const glm::vec3& p : pointsAround(random, 20000)) check(p);
+        // steps of a fifth of a voxel through cells, blocks, and the ends of the band
+        for (int path = 0; path < 200; ++path) {
+            const glm::vec3 from = random.point(0.5), to = random.point(0.5);
+            const int steps = int(5 * glm::distance(from, to) / float(h));
+            for (int i = 0; i <= steps; ++i) check(glm::mix(from, to, float(i) / float(steps)));
+        }
+        // the corners of voxels and blocks, one float below and above
+        for (int i = 0; i < 5000; ++i) {
+            glm::vec3 p(field.origin() + h * glm::round(glm::dvec3(random.point(30)) + 30.));
+            for (int axis = 0; axis < 3; ++axis) {
+                const float way = i % 3 == 0 ? 0.f : i % 3 == 1 ? -infinity : infinity;
+                if (way != 0) p[axis] = std::nextafter(p[axis], way);
+                check(p);
+            }
+        }
+        // NaN with any bits, as a place that a sampler keeps may have
+        for (const std::uint32_t bits : {0x7fc00000u, 0x7f800001u, 0x7fffffffu, 0xffc00000u, 0xffffffffu})
+            for (int axis = 0; axis < 3; ++axis) {
+                glm::vec3 p(0.35f, 0, 0);
+                p[axis] = std::bit_cast<float>(bits);
+                check(p);
+                check(glm::vec3(p[axis]));
+            }
+        REQUIRE(inBand > 5000);  // about 11,000
+    }
 }
 
 TEST_CASE("in 16 bits distances are off by half a step, in half the memory") {
