@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points outside a field's box: the lower bound of their distance to the surface, and nearer points in place of far
-// ones. Tested by tests/collider/field.cpp through Field::sample().
+// Points outside a field's box: lower bounds of their distances to the surface, and nearer points for far ones.
+// Tested by tests/collider/field.cpp through Field::sample().
 #pragma once
 
 #include <algorithm>

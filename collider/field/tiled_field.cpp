@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Queries of fields in tiles.
+// Tested by tests/tools/tiled_field.cpp through TiledField.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>

@@ -165,14 +165,16 @@ std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
     const TileRecord& record = manifest_.tiles[tile];
     Grids grids;
     if (record.field.path.empty()) {
-        grids.distance = openvdb::FloatGrid::create(record.inside ? -frame_.interiorWidth : frame_.exteriorWidth);
+        const auto grid = openvdb::FloatGrid::create(record.inside ? -frame_.interiorWidth : frame_.exteriorWidth);
+        grid->setTransform(openvdb::math::Transform::createLinearTransform(frame_.voxel));
+        grids.distance = grid;
     } else {
         record.field.requireIntact();
         const TileGrids read = readTile(record.field.path);
-        grids.distance = openvdb::FloatGrid::create(withBorder(read.grids->distance->tree(), read.border->tree()));
+        const auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(read.grids->distance);
+        addBorder(grid->tree(), read.border->tree());
+        grids.distance = grid;
     }
-    const openvdb::FloatGrid::Ptr grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(grids.distance);
-    grid->setTransform(openvdb::math::Transform::createLinearTransform(frame_.voxel));
     const std::vector<SurfaceBlock> surface = surfaceAround(placed_[tile]);
     const LayoutPart part{placed_[tile].first, placed_[tile].blocks, surface};
     return std::make_shared<const FieldData>(FieldLayout(frame_, grids, part, storage_));

@@ -130,14 +130,12 @@ TileGrids readTile(const std::filesystem::path& path) {
     return {fieldOf(grids, path), border};
 }
 
-openvdb::FloatTree::Ptr withBorder(const openvdb::FloatTree& tile, const openvdb::FloatTree& border) {
-    auto joined = std::make_shared<openvdb::FloatTree>(tile);
-    for (auto leaf = border.cbeginLeaf(); leaf; ++leaf) joined->addLeaf(new openvdb::FloatTree::LeafNodeType(*leaf));
+void addBorder(openvdb::FloatTree& tile, const openvdb::FloatTree& border) {
+    for (auto leaf = border.cbeginLeaf(); leaf; ++leaf) tile.addLeaf(new openvdb::FloatTree::LeafNodeType(*leaf));
     auto space = border.cbeginValueOff();
     space.setMaxDepth(openvdb::FloatTree::ValueOffCIter::LEAF_DEPTH - 1);
     for (; space; ++space)
-        if (*space != border.background()) joined->addTile(space.getLevel(), space.getCoord(), *space, false);
-    return joined;
+        if (*space != border.background()) tile.addTile(space.getLevel(), space.getCoord(), *space, false);
 }
 
 openvdb::GridBase::Ptr withOrigin(const openvdb::GridBase::ConstPtr& grid, const glm::dvec3& origin) {

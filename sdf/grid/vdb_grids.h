@@ -27,8 +27,8 @@ struct TileGrids {
 /// Reads a tile. Throws as readGrids() does, and std::runtime_error that names the file if it has no border.
 TileGrids readTile(const std::filesystem::path& path);
 
-/// Returns a tree of the values of a tile and of the border above it.
-openvdb::FloatTree::Ptr withBorder(const openvdb::FloatTree& tile, const openvdb::FloatTree& border);
+/// Adds the values of the border above a tile to those of the tile.
+void addBorder(openvdb::FloatTree& tile, const openvdb::FloatTree& border);
 
 /// Returns a grid whose transform has the origin of the mesh, as in files. The tree is shared. Throws
 /// std::invalid_argument if the grid is so far from zero that a file would round its voxels.

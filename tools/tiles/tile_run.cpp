@@ -187,7 +187,7 @@ class TileRun {
         }
         Json record = recordOf(place, tiling.own(tile).within(tiling.lattice()), count, built);
         record["readBytes"] = count * sizeof(TileTriangle);
-        if (built.grids) writeTile(built, place, plan.facts().origin, tiling.own(tile), record);
+        if (built.grids) writeTile(std::move(built), place, plan.facts().origin, tiling.own(tile), record);
         built = {};
         ::malloc_trim(0);  // what one tile has used is free for the next
         record["rank"] = ranks_.rank;
@@ -196,14 +196,15 @@ class TileRun {
         writeJson(folder_.record(place), record);
     }
 
-    void writeTile(const BuiltTile& tile, const glm::ivec3& place, const glm::dvec3& origin, const BlockBox& own,
+    void writeTile(BuiltTile tile, const glm::ivec3& place, const glm::dvec3& origin, const BlockBox& own,
                    Json& record) const {
         const std::filesystem::path field = folder_.field(place), cells = folder_.cells(place);
         openvdb::GridCPtrVec grids{withOrigin(tile.grids->distance, origin)};
         if (tile.grids->triangle) grids.push_back(withOrigin(tile.grids->triangle, origin));
         grids.push_back(withOrigin(tile.border, origin));
         writeGrids(field, grids);
-        writeSurfaceBlocks(cells, surfaceBlocksOf(tile, own));
+        grids.clear();
+        writeSurfaceBlocks(cells, surfaceBlocksOf(std::move(tile), own));
         record["file"] = field.filename().string();
         record["hash"] = fileHash(field);
         record["cells"] = cells.filename().string();
@@ -211,10 +212,11 @@ class TileRun {
         record["writtenBytes"] = std::filesystem::file_size(field) + std::filesystem::file_size(cells);
     }
 
-    std::vector<SurfaceBlock> surfaceBlocksOf(const BuiltTile& tile, const BlockBox& own) const {
+    std::vector<SurfaceBlock> surfaceBlocksOf(BuiltTile tile, const BlockBox& own) const {
         const auto coord = [](const glm::ivec3& v) { return openvdb::Coord(v.x, v.y, v.z); };
-        const openvdb::FloatTree::Ptr tree = withBorder(tile.grids->distance->tree(), tile.border->tree());
-        return surfaceBlocks(*tree, {coord(own.first), coord(own.end - 1)}, a_.options.voxelSize);
+        const auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(tile.grids->distance);
+        addBorder(grid->tree(), tile.border->tree());
+        return surfaceBlocks(grid->tree(), {coord(own.first), coord(own.end - 1)}, a_.options.voxelSize);
     }
 
     template <class Work>
