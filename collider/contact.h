@@ -112,6 +112,7 @@ struct ContactReport {
 /// from one thread at a time.
 class ContactCache {
   public:
+    /// An empty cache, for a pair of bodies that collide() has not seen.
     ContactCache();
     ~ContactCache();
     /// Takes over the data of another cache, which may then only be destroyed or assigned to.

@@ -38,7 +38,7 @@ struct LastBlock {
 
 /// How a field stores its distances.
 enum class Storage {
-    float32,
+    float32,  ///< as the level set holds them: no rounding
     /// Fixed-point steps of (wider half of the band) / 32,766. The error is half a step: 4.6e-5 voxels for a half width
     /// of 3. Takes half the memory.
     fixed16,

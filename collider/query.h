@@ -24,7 +24,11 @@ struct Sample {
 };
 
 /// The kind of triangle feature that a closest point lies on.
-enum class Feature : std::uint8_t { face, edge, vertex };
+enum class Feature : std::uint8_t {
+    face,    ///< the interior of a triangle
+    edge,    ///< the interior of an edge
+    vertex,  ///< a corner of a triangle
+};
 
 /// In place of a triangle's index where there is none.
 inline constexpr std::uint32_t noTriangle = ~0u;

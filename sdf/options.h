@@ -77,6 +77,7 @@ struct BuildOptions {
 
 /// Thrown by build() after `BuildOptions::progress` returned false.
 struct Cancelled : std::runtime_error {
+    /// Its what() is "cancelled".
     Cancelled() : std::runtime_error("cancelled") {}
 };
 

@@ -20,6 +20,7 @@ struct Placement {
     Pose pose{};         ///< applied after the scale
     glm::vec3 scale{1};  ///< positive: a reflection would invert the body
 
+    /// The body as it is: at the origin, not rotated and not scaled.
     Placement() = default;
     /// A pose, perhaps with a scale along each axis of the body.
     Placement(const Pose& placed, const glm::vec3& stretch = glm::vec3(1)) : pose(placed), scale(stretch) {}
