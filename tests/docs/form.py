@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""usage: form.py SOURCE: checks the form of pages: items of lists of at most three lines, paragraphs of at most six, and a picture
-on each page that explains how contacts are found, kept, reduced and bounced."""
+"""usage: form.py SOURCE: checks the form of pages: items of lists of at most three lines, paragraphs of at most six, cells of tables
+of at most 40 words, and a picture on each page that explains how contacts are found, kept, reduced and bounced."""
 
 import re
 import sys
@@ -9,6 +9,7 @@ from pathlib import Path
 CODE = re.compile(r"^```.*?^```$|^<!--.*?-->$", re.M | re.S)
 ITEM = re.compile(r"\s*(?:[-*]|\d+\.) ")
 MAX_ITEM, MAX_PARAGRAPH = 3, 6  # [lines]
+MAX_CELL = 40                   # [words]
 WITH_PICTURE = ["finding", "motion", "solver", "shapes", "extensions", "bullet-world"]
 PICTURE = re.compile(r"!\[[^\]]+\]\(([\w./-]+)\)")
 
@@ -24,11 +25,22 @@ def parts(page):
             part.append(line)
 
 
+def cells(page):
+    """The line number, the number of words and the text of each cell of a table."""
+    for number, line in enumerate(page.splitlines(), 1):
+        for cell in line.strip("| ").split("|") if line.startswith("|") else ():
+            yield number, len(cell.split()), cell.strip()
+
+
 def faults(root):
     for path in [*sorted(root.glob("*.md")), *sorted((root / "docs").rglob("*.md"))]:
         if path.name == "CHANGELOG.md" or path == root / "docs" / "paper.md":
             continue
-        for number, lines in parts(path.read_text()):
+        page = path.read_text()
+        for number, words, cell in cells(page):
+            if words > MAX_CELL:
+                yield f"{path.relative_to(root)}:{number}: a cell of {words} words, {MAX_CELL} at most: {cell[:60]}"
+        for number, lines in parts(page):
             limit = MAX_ITEM if ITEM.match(lines[0]) else MAX_PARAGRAPH
             if len(lines) > limit:
                 yield f"{path.relative_to(root)}:{number}: {len(lines)} lines, {limit} at most: {lines[0].strip()[:60]}"
