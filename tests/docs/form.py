@@ -34,14 +34,15 @@ def cells(page):
 
 def faults(root):
     for path in [*sorted(root.glob("*.md")), *sorted((root / "docs").rglob("*.md"))]:
-        if path.name == "CHANGELOG.md" or path == root / "docs" / "paper.md":
+        if path.name == "CHANGELOG.md":
             continue
         page = path.read_text()
         for number, words, cell in cells(page):
             if words > MAX_CELL:
                 yield f"{path.relative_to(root)}:{number}: a cell of {words} words, {MAX_CELL} at most: {cell[:60]}"
         for number, lines in parts(page):
-            limit = MAX_ITEM if ITEM.match(lines[0]) else MAX_PARAGRAPH
+            # the repeated paper lists in each item all grids in which it is ahead
+            limit = MAX_ITEM if ITEM.match(lines[0]) and path != root / "docs" / "paper.md" else MAX_PARAGRAPH
             if len(lines) > limit:
                 yield f"{path.relative_to(root)}:{number}: {len(lines)} lines, {limit} at most: {lines[0].strip()[:60]}"
     for name in WITH_PICTURE:

@@ -53,6 +53,13 @@ def conditions_of(page):
     return DATE.findall(named["date"] or "\n".join(lines)), MACHINE.findall(named["machine"] or "\n".join(lines))
 
 
+def faults_of_paper(root):
+    """Parts of the repeated paper that do not name the bilayer that was measured."""
+    for line in re.findall(r"^\*`\./run paper [^\n]*", (root / "docs" / "paper.md").read_text(), re.M):
+        if not VERSION.search(line):
+            yield f"docs/paper.md names no version or revision of bilayer: {line}"
+
+
 def faults_of_index(root):
     """Rows of docs/results.md whose dates or machines are not those of the page."""
     index = next(rows for head, rows in tables((root / "docs" / "results.md").read_text()) if "| date | machine |" in head)
@@ -67,11 +74,12 @@ def faults_of_index(root):
 
 def faults_of_revisions(root):
     """Revisions that the history does not have. A copy without history is not asked."""
-    named = {rev for path in (root / "docs" / "results").glob("*.md") for rev in VERSION.findall(path.read_text()) if rev}
+    pages = [*(root / "docs" / "results").glob("*.md"), root / "docs" / "paper.md"]
+    named = {rev for path in pages for rev in VERSION.findall(path.read_text()) if rev}
     shallow = subprocess.run(["git", "rev-parse", "--is-shallow-repository"], cwd=root, capture_output=True, text=True).stdout.strip()
     for revision in sorted(named if shallow == "false" else ()):
         if subprocess.run(["git", "cat-file", "-e", f"{revision}^{{commit}}"], cwd=root, stderr=subprocess.DEVNULL).returncode:
-            yield f"docs/results: there is no revision {revision}"
+            yield f"docs/results or docs/paper.md: there is no revision {revision}"
 
 
 def is_results(root, path):
@@ -125,6 +133,7 @@ def faults(root):
             if f"(results/{path.name}" not in (docs / index).read_text():
                 yield f"docs/{index} does not link results/{path.name}"
     yield from faults_of_index(root)
+    yield from faults_of_paper(root)
     yield from faults_of_revisions(root)
     for path in [*sorted(root.glob("*.md")), *sorted(docs.rglob("*.md"))]:
         if "not recorded" in path.read_text():

@@ -6,7 +6,7 @@ outputs with those on the page. --write puts the outputs of this run into the pa
 the page needs is not installed.
 
 Commands run as on a reader's machine, except for these, which tests/docs/stand-ins replaces: `./run`, which has built
-everything; `sudo apt install`, which only looks; `sudo cmake --install`, which installs into SCRATCH.
+everything; `sudo apt install`, which only looks; `sudo cmake --install`, which installs below SCRATCH.
 
 With --packages, in a clean root (tests/package/debian.sh), all commands are real but `./run`: its packages are in DIR.
 --from leaves out what stands before a heading.
@@ -70,7 +70,7 @@ def environment(options):
     installed = options.scratch / "installed" / "usr" / "local"
     python = next(installed.glob("lib/python3*/*-packages"), None)
     stand_ins = options.source / "tests" / "docs" / "stand-ins"
-    result = dict(os.environ, HOME=str(options.scratch), DESTDIR=str(options.scratch / "installed"),
+    result = dict(os.environ, HOME=str(options.scratch), BILAYER_INSTALL_ROOT=str(options.scratch / "installed"),
                   PATH=f"{stand_ins}:{installed}/bin:/usr/bin:/bin", CMAKE_PREFIX_PATH=str(installed), CMAKE_GENERATOR="Ninja",
                   CMAKE_TOOLCHAIN_FILE=str(options.source / "tests" / "docs" / "toolchain.cmake"),
                   BILAYER_SOURCE=str(options.source))
