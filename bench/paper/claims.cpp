@@ -63,10 +63,8 @@ std::string remarkTheorem1(const json& data) {
     if (convex > 2.0 / 3)
         text += fmt::format(
             " At convex edges the theorem does not hold as it is printed: the proof's case 3 bounds `d_e - d` from "
-            "above "
-            "only. There the points of a face's inner layer come near the other face, or through it, and make "
-            "distances "
-            "too small by up to {:.1f} delta, however fine the mesh.",
+            "above only. There the points of a face's inner layer come near the other face, or through it. They make "
+            "distances too small by up to {:.1f} delta, however fine the mesh.",
             convexDelta);
     return text.empty() ? "" : "\n" + text.substr(1) + "\n";
 }
@@ -85,33 +83,34 @@ std::string textTheorems(const json& data) {
                                         fmt::format("{}", error["wrong"].get<std::uint64_t>()),
                                         fmt::format("{:.2f}", error["farthest"].get<double>())};
     };
-    return fmt::format("Random triangles, wedges and bends (seed {}); the tests hold them to what is said here.\n\n",
+    return fmt::format("Random triangles, wedges and bends (seed {}). Tests check what is said here.\n\n",
                        data["seed"].get<unsigned>()) +
-           "**Theorem 1**: without sign errors `|d_e - d| < 2/3 L_max`, in 2D `L_max / 2`. The worst of a million "
-           "points over edges and triangles, and of 8,000 around wedges of two rows of triangles (delta 0.5, L_max "
-           "0.1 to 2, each triangle sampled once):\n\n" +
-           table({"", "bound", "most too far [L_max]", "most too near [L_max]", "most too near [delta]"},
+           "**Theorem 1**: without sign errors `|d_e - d| < 2/3 L_max`, in 2D `L_max / 2`. The table has the worst of "
+           "a "
+           "million points over edges and triangles, and of 8,000 points around wedges of two rows of triangles. Delta "
+           "is 0.5, L_max 0.1 to 2, and each triangle is sampled once.\n\n" +
+           table({"", "bound", "max too far [L_max]", "max too near [L_max]", "max too near [delta]"},
                  {distance("edges", "over edges, 2D", "1/2"), distance("triangles", "over triangles", "2/3"),
                   distance("reflex", "solid angle 180 degrees and more", "2/3"),
                   distance("blunt", "135 to 180 degrees", "2/3"), distance("square", "90 to 135 degrees", "2/3"),
                   distance("sharp", "below 90 degrees", "2/3")}) +
            remarkTheorem1(data) +
-           "\n**Theorem 2**: an edge of 2 L1 meets a longer one of 2 L2 at a bend of 2 theta; F is where the sign "
-           "error "
-           "ends, and `OF <= (L2 - L1) / 2` where `L2 tan(theta) <= delta`. Points are tried within a square of 4 OF "
-           "to each side of O, so that where the region is open, the farthest is that of the square:\n\n" +
-           table({"bends with", "most of OF / ((L2 - L1) / 2)", "formula's F off the bisector by", "wrong signs met",
+           "\n**Theorem 2**: an edge of 2 L1 meets a longer one of 2 L2 at a bend of 2 theta. The sign error ends at "
+           "F, "
+           "and `OF <= (L2 - L1) / 2` where `L2 tan(theta) <= delta`. Points are tried within a square of 4 OF to each "
+           "side of O. Where the region is open, the farthest is that of the square.\n\n" +
+           table({"bends with", "max of OF / ((L2 - L1) / 2)", "formula's F off the bisector by", "wrong signs met",
                   "the farthest of them [OF]"},
                  {sign("closed", "delta sin(2 theta) < L2 + L1 cos(2 theta)"), sign("open", "else")}) +
            (std::max(double(data["closed"]["bound"]), double(data["open"]["bound"])) < 1 + rounding
                 ? "\nThe inequality holds."
                 : "\nThe inequality does not hold.") +
            (double(data["closed"]["farthest"]) < 1 + rounding && double(data["open"]["farthest"]) > 1
-                ? " That F is the farthest point on the wrong side holds on one more condition: the region OGF of Fig. "
-                  "6 is a triangle only where the bisector of P and Q meets the longer edge, `delta sin(2 theta) < L2 "
-                  "+ L1 cos(2 theta)`; for edges alike and delta = 2 L2, where the theorem asks for tan(theta) <= 2, "
-                  "that is tan(theta) < 1/2. Otherwise the region is open, and wrong signs end only where other "
-                  "samples are nearer.\n"
+                ? " F is the farthest point on the wrong side under one more condition: the bisector of P and Q meets "
+                  "the longer edge, `delta sin(2 theta) < L2 + L1 cos(2 theta)`. Otherwise the region OGF of Fig. 6 is "
+                  "open instead of a triangle, and wrong signs end only where other samples are nearer. For equal "
+                  "edges and delta = 2 L2 the theorem asks for tan(theta) <= 2, and the condition for tan(theta) < "
+                  "1/2.\n"
                 : "\n");
 }
 
@@ -235,9 +234,11 @@ std::string textWalls(const json& data) {
     for (const json& row : data["rows"])
         if (row["layers"]["outsideWrong"] > 0) thickest = std::max(thickest, row["thickness"].get<double>());
     return fmt::format(
-               "Section 5 names the limit: layers that cross. Walls of {} x {} voxels, thinner and thinner, their two "
-               "faces cut into triangles independently, {} places and turns each (seed {}); voxels within {} of the "
-               "surface on the wrong side. OpenVDB is `meshToVolume` without renormalisation.\n\n",
+               "Section 5 names the limit: layers that cross. Walls of {} x {} voxels get thinner and thinner. Their "
+               "two "
+               "faces are cut into triangles independently, with {} places and rotations each (seed {}). The table has "
+               "the voxels within {} of the surface that are on the wrong side. OpenVDB is `meshToVolume` without "
+               "renormalisation.\n\n",
                wallSide, wallSide, wallRotations, data["seed"].get<unsigned>(), wallBand) +
            table({"thickness [voxels]", "double-layer: outside called inside", "inside called outside",
                   "OpenVDB: outside called inside", "inside called outside", "exact: outside called inside",
@@ -245,8 +246,9 @@ std::string textWalls(const json& data) {
                  rows) +
            "\nThe inner layers of two faces cross where a wall is thinner than 2 delta, one voxel." +
            (thickest >= 1
-                ? fmt::format(" Samples that lie aside bring wrong signs to thicker ones too, here of {} voxels.",
-                              thickest)
+                ? fmt::format(
+                      " Samples to the side of a voxel bring wrong signs to thicker walls too, here of {} voxels.",
+                      thickest)
                 : "") +
            " Choose `exact` where there are such walls. A wall without thickness has no inside.\n";
 }

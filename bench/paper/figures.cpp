@@ -80,8 +80,8 @@ std::string textFigure7(const json& data) {
     const auto& grids = published::figure7;
     return shown(data, fmt::format("The bunny: original, and by the double layer at {}^3, {}^3 and {}^3.", grids[0],
                                    grids[1], grids[2])) +
-           "\nWhat is smaller than a step is gone; what the grid resolves is there, with some noise of the samples "
-           "under it, as in the paper.\n";
+           "\nDetails smaller than a step are gone. Those that the grid resolves are there, with some noise of the "
+           "samples, as in the paper.\n";
 }
 
 constexpr int coarse = published::figure7.front();  // the paper does not state its grid
@@ -100,8 +100,9 @@ std::string textFigure8(const json& data) {
     return shown(data, fmt::format("The sphere of Table 5, of variance {}: original, and at {}^3 with delta = {:.1f}, "
                                    "{:.1f} and {:.1f} steps.",
                                    published::table5[0].variance, coarse, deltas[0], deltas[1], deltas[2])) +
-           "\nThe farther the layers are apart, the less it counts where on them the samples lie: the noise falls with "
-           "delta, as in the paper. What speaks against a large one is thin walls.\n";
+           "\nThe farther the layers are apart, the less the places of the samples on them matter: the noise falls "
+           "with "
+           "delta, as in the paper. Thin walls speak against a large delta.\n";
 }
 
 json largeFigure(const Run& run, const std::string& name, const char* file, const glm::dvec3& from, int pixels,
@@ -134,10 +135,9 @@ std::string textLarge(const json& data, const published::Surface& paper, const c
                              largeGrid.x, largeGrid.y, largeGrid.z, data["origin"].get<std::string>())) +
            "\n" + counts(data, paper) +
            fmt::format(
-               "\nThe surface is extracted by OpenVDB's `volumeToMesh`, dual contouring, which gives as many triangles "
-               "as marching cubes: two for each lattice edge that the surface crosses. Steps are the same along all "
-               "axes, and one scale of the "
-               "model holds for all, other than in Table 4. {}\n",
+               "\nThe surface is extracted by OpenVDB's `volumeToMesh`, dual contouring. It gives as many triangles as "
+               "marching cubes: two for each lattice edge that the surface crosses. Steps are the same along all axes, "
+               "and one scale of the model holds for all, unlike in Table 4. {}\n",
                remark);
 }
 
@@ -145,15 +145,16 @@ json measureFigure9(const Run& run) {
     return largeFigure(run, "dragon", "figure9.jpg", {-0.25, 0.3, 1}, 820, 600);
 }
 std::string textFigure9(const json& data) {
-    return textLarge(data, published::surfaces[0],
-                     "The model fills the grid along x; how much of its grid the paper's dragon fills is not told.");
+    return textLarge(
+        data, published::surfaces[0],
+        "The model fills the grid along x. The paper does not state how much of its grid the dragon fills.");
 }
 json measureFigure10(const Run& run) {
     return largeFigure(run, "circular box", "figure10.jpg", {0.1, 0.75, 1}, 820, 700);
 }
 std::string textFigure10(const json& data) {
     return textLarge(data, published::surfaces[1],
-                     "The paper's box is not public; this one is carved by formula, with relief of like kind.");
+                     "The paper's box is not public. This one is carved by formula, with similar relief.");
 }
 
 // The grid on which the double layer's surface has as many triangles as the paper's.
@@ -203,9 +204,8 @@ std::string textFigure11(const json& data) {
                                    "same grid.",
                                    data["nodes"].get<int>())) +
            "\n" + counts(data, published::surfaces[2]) +
-           "\nThe paper does not tell its grid: this one is searched for so that the surfaces' counts agree, which "
-           "says "
-           "nothing of the method.\n";
+           "\nThe paper does not state its grid. This one is searched for so that the counts of triangles agree, which "
+           "says nothing of the method.\n";
 }
 
 }  // namespace

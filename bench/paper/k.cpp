@@ -72,17 +72,17 @@ std::string textK(const json& data) {
         cheaper = cheaper && (before <= 0 || time / before < predicted);
         before = time;
     }
-    return "The paper takes K = 2, finds K = 1 noisy and K = 3 no better, and gives the cost of a step of K as (2K + "
-           "3)^3 / (2K + 1)^3 (Eq. 6). The bunny at 251^3, the dense program:\n\n" +
+    return "The paper takes K = 2, finds K = 1 noisy and K = 3 no better. It gives the cost of a step of K as (2K + "
+           "3)^3 "
+           "/ (2K + 1)^3 (Eq. 6). The table has the bunny at 251^3, by the dense program:\n\n" +
            table({"K", "seconds", "without empty grids", "times K - 1", "Eq. 6", "e_max / e_avg within 1 step",
                   "of all nodes reached", "missing within 1 step", "wrong signs within 1 step", "nodes reached"},
                  rows) +
-           (cheaper ? "\nA step of K costs less than Eq. 6 has it, even without the empty grids: it counts updates of "
-                      "nodes "
-                      "alone, while triangles are read and samples chosen as often with any K.\n"
+           (cheaper ? "\nA step of K costs less than Eq. 6 says, even without the empty grids. Eq. 6 counts updates of "
+                      "nodes alone, while triangles are read and samples chosen as often with any K.\n"
                     : "") +
-           "\nWhat K changes is how far the field reaches; near the surface it hardly matters. bilayer's "
-           "`double-layer` has no K to choose: a sample reaches as far as the band asks.\n";
+           "\nK changes how far the field reaches; near the surface it hardly matters. bilayer's `double-layer` has no "
+           "K to choose: a sample reaches as far as the band asks.\n";
 }
 
 }  // namespace

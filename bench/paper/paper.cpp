@@ -97,13 +97,13 @@ void writeWhole(const fs::path& path, const std::string& text) {
     fs::rename(unfinished, path);
 }
 
-void measure(const Part& part, const Run& run, const fs::path& store) {
+void measure(const Part& part, const Run& run, const fs::path& store, const std::string& revision) {
     fmt::print(stderr, "== {} ({})\n", part.name, part.title);
     const bench::Stopwatch watch;
     json data = part.measure(run);
     const double seconds = watch.seconds();
-    const json kept{
-        {"when", now()}, {"seconds", seconds}, {"rounds", run.rounds}, {"machine", machine()}, {"data", data}};
+    const json kept{{"when", now()},        {"bilayer", revision},  {"seconds", seconds},
+                    {"rounds", run.rounds}, {"machine", machine()}, {"data", data}};
     fs::create_directories(store);
     writeWhole(keptAt(store, part.name), kept.dump(1) + "\n");
     if (data.contains("skipped"))
@@ -124,14 +124,17 @@ std::string sentence(const json& machine) {
 
 std::string opening() {
     return fmt::format(
-        "# The double layer paper, repeated\n\nY. Wu, J. Man and Z. Xie, \"A double layer method for constructing "
-        "signed distance fields from triangle meshes\", *Graphical Models* 76 (2014) 214-223: each of its tables, "
-        "figures and claims, its own figures next to those of this machine. `./run paper` measures all and writes this "
-        "page, `./run paper table2` a part of it; what was measured lies in `docs/paper/*.json`. The paper's numbers "
-        "stand in `bench/paper/published.h`. [method.md](method.md) tells how the method is "
-        "done here.\n\nThe paper ran on a {} and a {}. Its grids span a box of side {}: that is deduced from its "
-        "steps and numbers of nodes, all but one of which agree. How much of it a model fills is not told: here all "
-        "but {} steps on each side.\n",
+        "# The double layer paper, repeated\n\nThis page repeats each table, figure and claim of one paper. The "
+        "paper's "
+        "figures stand next to those of this machine.\n\n"
+        "- **Paper.** Y. Wu, J. Man and Z. Xie, \"A double layer method for constructing signed distance fields from "
+        "triangle meshes\", *Graphical Models* 76 (2014) 214-223.\n"
+        "- **Command.** `./run paper` measures all and writes this page; `./run paper table2` measures a part of it.\n"
+        "- **Data.** The measured numbers are in `docs/paper/*.json`, the paper's in `bench/paper/published.h`.\n"
+        "- **Method.** [method.md](method.md) explains how bilayer implements it.\n\n"
+        "The paper ran on a {} and a {}. Its grids span a box of side {}: that follows from its steps and numbers of "
+        "nodes, all but one of which agree. The paper does not state how much of its grid a model fills. Here it fills "
+        "all but {} steps on each side.\n",
         published::processor, published::gpu, boxSide, marginNodes);
 }
 
@@ -148,7 +151,7 @@ Result read(const Part& part, const fs::path& store) {
     if (!file) return {part, {}, fmt::format("Not measured yet: `./run paper {}`.\n", part.name)};
     try {
         json kept = json::parse(file);
-        for (const char* key : {"when", "seconds", "rounds", "machine", "data"}) kept.at(key);
+        for (const char* key : {"when", "bilayer", "seconds", "rounds", "machine", "data"}) kept.at(key);
         sentence(kept["machine"]);
         if (!kept["data"].contains("skipped")) part.text(kept["data"]);  // throws if numbers are missing or invalid
         return {part, kept, ""};
@@ -166,8 +169,9 @@ std::string textOf(const Part& part, const json& kept, bool severalMachines, std
     std::string text = part.text(data);
     if (part.behind)
         for (const std::string& line : part.behind(data)) behind += "- " + line + "\n";
-    return text + fmt::format("\n*`./run paper {}`, {} UTC, {:.0f} s, rounds: {}{}.*\n", part.name,
-                              kept["when"].get<std::string>(), kept["seconds"].get<double>(), kept["rounds"].get<int>(),
+    return text + fmt::format("\n*`./run paper {}`, bilayer {}, {} UTC, {:.0f} s, rounds: {}{}.*\n", part.name,
+                              kept["bilayer"].get<std::string>(), kept["when"].get<std::string>(),
+                              kept["seconds"].get<double>(), kept["rounds"].get<int>(),
                               severalMachines ? ", on " + sentence(kept["machine"]) : "");
 }
 
@@ -193,7 +197,8 @@ void writePage(const fs::path& page, const fs::path& store) {
     for (const std::string& machine : machines) text += "\nMeasured on: " + machine + ".\n";
     const std::string without = fmt::format("Not measured: {}.\n", fmt::join(missing, ", "));
     text += missing.empty() ? fmt::format("\nAll parts together took {:.0f} minutes.\n", seconds / 60) : "\n" + without;
-    text += body + "\n## Where bilayer is behind\n\nThe paper, or a peer, by the numbers above:\n\n" + behind;
+    text += body + "\n## Where bilayer is behind\n\nWhere the paper, or a peer, is ahead by the numbers above:\n\n" +
+            behind;
     if (!missing.empty())
         text += (behind.empty() ? "" : "\n") + without;
     else if (behind.empty())
@@ -204,7 +209,7 @@ void writePage(const fs::path& page, const fs::path& store) {
 int run(int argc, char** argv) {
     CLI::App app("Repeats the experiments of the double layer paper and writes docs/paper.md.");
     std::vector<std::string> names;
-    std::string store, docs = "docs", meshes = "build/paper/meshes";
+    std::string store, docs = "docs", meshes = "build/paper/meshes", revision = "of no named revision";
     bool page = false, list = false;
     Run run;
     std::vector<std::string> known;
@@ -217,6 +222,7 @@ int run(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--store", store, "another folder of the results");
     app.add_option("--meshes", meshes, "folder of downloaded meshes")->capture_default_str();
+    app.add_option("--revision", revision, "revision of the sources, which the page names");
     app.add_flag("--list", list, "names of all parts");
     app.add_flag("--page", page, "write the page from the existing results");
     CLI11_PARSE(app, argc, argv);
@@ -227,7 +233,7 @@ int run(int argc, char** argv) {
     run.picturesOnPage = "paper";
     fs::create_directories(run.pictures);
     for (const Part& part : parts())
-        if (std::count(names.begin(), names.end(), part.name)) measure(part, run, store);
+        if (std::count(names.begin(), names.end(), part.name)) measure(part, run, store, revision);
     if (page) writePage(fs::path(docs) / "paper.md", store);
     return 0;
 }

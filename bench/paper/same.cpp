@@ -125,25 +125,29 @@ std::string textSame(const json& data) {
                         count("farWrong") + " / " + count("farWrongBlocks")});
     }
     return "bilayer fills blocks of 8x8x8 voxels in parallel, from samples sorted by cells, in floats around the "
-           "block; the paper's program walks over triangles and keeps dense grids (`bench/paper/dense.cpp`). With "
-           "`DoubleLayerOptions::fillGaps = false` and a half width that trims nothing " +
+           "block. "
+           "The paper's program walks over triangles and keeps dense grids (`bench/paper/dense.cpp`). With "
+           "`DoubleLayerOptions::fillGaps = false` and a half width that trims nothing, " +
            (different ? fmt::format("their fields differ at {} nodes for no reason named below", different)
                       : std::string("both give the same distances and signs at all nodes reached")) +
            ", at 251^3:\n\n" +
-           table({"model", "subdivision", "nodes reached", "most apart [steps]", "half-way nodes", "ties", "else apart",
-                  "far nodes", "of the wrong sign, serial / blocks"},
+           table({"model", "subdivision", "nodes reached", "max difference [steps]", "half-way nodes", "ties",
+                  "other differences", "far nodes", "of the wrong sign, serial / blocks"},
                  rows) +
-           "\nHalf-way nodes lie at the rim of the cube around a sample that is half-way between two nodes, up to "
-           "rounding: it may update the cube around either, and the field is that of one of the two. Ties are nodes "
-           "that both layers are equally near to, up to rounding, with the other sign. A far node has the sign that a "
-           "scan along z, or OpenVDB's flood, hands on from the nearest known one, right or wrong" +
-           (dragon ? "; the dragon meets itself, and its pseudonormals, which judge here, contradict each other there"
+           "\n- **Half-way nodes** are at the rim of the cube around a sample that is half-way between two nodes, up "
+           "to "
+           "rounding. The sample may update the cube around either node, and the field is that of one of the two.\n"
+           "- **Ties** are nodes that both layers are equally near to, up to rounding, with the other sign.\n"
+           "- **Far nodes** have the sign that a scan along z, or OpenVDB's flood, carries from the nearest known one, "
+           "right or wrong." +
+           (dragon ? " The dragon self-intersects, and its pseudonormals, which judge here, contradict each other "
+                     "there."
                    : "") +
-           ".\n\nBy default bilayer's "
-           "field differs on purpose: every sample reaches as far as the band asks and the band is trimmed to its "
-           "width; triangles that need more than n_max rows are quartered; long slivers get a row of samples along "
-           "them. As in Algorithm 1, only upright parts of a triangle have a sample. [method.md](method.md) says "
-           "why.\n";
+           "\n\nBy default bilayer's field differs on purpose, for reasons that [method.md](method.md) gives:\n\n"
+           "- Every sample reaches as far as the band asks, and the band is trimmed to its width.\n"
+           "- Triangles that need more than n_max rows are quartered.\n"
+           "- Long slivers get a row of samples along them.\n\n"
+           "As in Algorithm 1, only upright parts of a triangle have a sample.\n";
 }
 
 }  // namespace

@@ -112,16 +112,18 @@ std::string textTable1(const json& data) {
                       order(data["rows"], "blocks", "worst"), order(data["rows"], "blocks", "mean"),
                       order(data["rows"], "exact", "worst")});
     std::string text = fmt::format(
-        "The bunny here: {}, {} triangles. Errors by Eq. 4 against angle-weighted pseudonormals, in the mesh's unit. "
-        "*Dense*: the paper's serial program (`bench/paper/dense.cpp`), over all nodes that it reaches. *Blocks*: "
-        "bilayer's `double-layer`, half width 2; `exact`, half width 3. *Order*: the power of the step that the error "
-        "falls with; \"-\" where it does not fall from each grid to the next, and so has none.\n\n",
+        "The bunny here is {}, with {} triangles. Errors are by Eq. 4 against angle-weighted pseudonormals, in the "
+        "mesh's unit.\n\n"
+        "- *Dense*: the paper's serial program (`bench/paper/dense.cpp`), over all nodes that it reaches.\n"
+        "- *Blocks*: bilayer's `double-layer`, half width 2. *Exact*: its `exact`, half width 3.\n"
+        "- *Order*: the power of the step with which the error falls; \"-\" where it does not fall from each grid to "
+        "the next.\n\n",
         data["origin"].get<std::string>(), data["triangles"].get<int>());
     text += table({"grid", "step, paper / here", "e_max, paper", "dense", "e_avg, paper", "dense", "blocks, e_max",
                    "blocks, e_avg", "exact, e_max"},
                   metres);
     text += "\nThe same in steps, e_max / e_avg:\n\n";
-    text += table({"grid", "paper", "dense", "dense, nodes within 2 steps", "dense, half a cell aside", "blocks",
+    text += table({"grid", "paper", "dense", "dense, nodes within 2 steps", "dense, offset by half a cell", "blocks",
                    "exact", "wrong signs, dense"},
                   inSteps);
     const auto steps = [&](std::size_t i, const char* which, const char* norm) {
@@ -140,22 +142,24 @@ std::string textTable1(const json& data) {
     const std::string perEpsilon = listed(data["rows"], "perEpsilon");
     return text +
            fmt::format(
-               "\nThe mean error here, in the mesh's unit, is {:.1f} times smaller than the paper's at {} nodes "
-               "and {:.1f} times at {}. Algorithm 1 rounds the number of rows up: a triangle smaller than "
-               "epsilon has one sample, one hardly larger has three. So the coarser the grid, the denser the "
-               "samples are in steps{}, and the error falls more slowly than the step (order {}). Samples "
-               "come down to 1/2 for an epsilon of surface only where triangles have many rows, and only from "
-               "there on would the error fall as the step does. The worst nodes of *dense* have the wrong sign, "
-               "or lie at the rim of what it reaches, where a node may know one layer well and the other one "
-               "hardly. The paper does not say over which nodes its e_max is taken: all that *dense* reaches "
-               "have larger ones. *Blocks* is bilayer's default, with more samples and a band that is trimmed to its "
-               "width: its worst errors, in steps, are {:.2f} to {:.2f} times the paper's. `exact` is off where a node "
-               "lies within 1e-4 steps of the surface, and its sign "
-               "may be either.\n\nThe paper's means are not explained by its method: {:.2f} to {:.2f} steps, "
-               "where *dense* has {:.3f} to {:.3f}. A mean of that size, sqrt(3) / 4 = {:.2f} for normals of "
-               "all directions, comes out where the two fields compared lie half a cell aside along each axis, "
-               "as values at nodes and at centres of cells do (the column *half a cell aside*). That is a "
-               "guess. Nor does the step printed for {} nodes go with the others: {} / {} is {:.3f}.\n",
+               "\nThe mean error here, in the mesh's unit, is {:.1f} times smaller than the paper's at {} nodes and "
+               "{:.1f} times at {}.\n\n"
+               "- **Samples.** Algorithm 1 rounds the number of rows up: a triangle smaller than epsilon has one "
+               "sample, one hardly larger has three. So coarser grids have denser samples{}.\n"
+               "- **Order.** The error therefore falls more slowly than the step (order {}). It would fall as the step "
+               "does if triangles had many rows, and 1/2 sample for an epsilon of surface.\n"
+               "- **Worst nodes.** Those of *dense* have the wrong sign, or are at the rim of what it reaches. There a "
+               "node may know one layer well and the other one hardly.\n"
+               "- **e_max.** The paper does not say over which nodes it takes it. Over all that *dense* reaches it is "
+               "larger.\n"
+               "- **Blocks.** bilayer's default has more samples, and a band that is trimmed to its width. Its worst "
+               "errors, in steps, are {:.2f} to {:.2f} times the paper's.\n"
+               "- **Exact.** It is off where a node is within 1e-4 steps of the surface, and its sign may be either.\n"
+               "\nThe paper's method does not explain its means: they are {:.2f} to {:.2f} steps, where *dense* has "
+               "{:.3f} to {:.3f}. Two fields half a cell apart along each axis, as values at nodes and at centres of "
+               "cells are, have a mean of that size: sqrt(3) / 4 = {:.2f} for normals of all directions (the column "
+               "*offset by half a cell*). That is a guess. The step printed for {} nodes does not fit the others: "
+               "{} / {} is {:.3f}.\n",
                smaller(0), published::table1[0].nodes, smaller(last), published::table1[last].nodes,
                perEpsilon.empty() ? "" : fmt::format(", {} for an epsilon of surface on these grids", perEpsilon),
                order(data["rows"], "all", "mean"), minRatio, maxRatio, smallest, largest, steps(0, "all", "mean"),

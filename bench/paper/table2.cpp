@@ -60,23 +60,25 @@ std::string remarksTable2(const std::vector<double>& gains, const std::vector<do
                           const std::vector<double>& serial, const std::vector<std::string>& more) {
     const double gain = bench::geometricMean(gains);
     return fmt::format(
-               "\nAWPN takes {:.1f} times as long as in the paper, the dense program, plain, {:.1f} times, in the "
-               "geometric mean: these are plain programs on another processor, and the paper calls its AWPN \"totally "
-               "optimised\". On one thread the block-wise double layer is {:.1f} times as fast as the dense program{}. "
-               "With the rows of section 4.2 the dense program takes {:.2f} of its time without{}. With the recursive "
-               "subdivision it takes {:.2f} of its time with Algorithm 1, which the paper finds the faster one",
+               "\n- AWPN takes {:.1f} times as long as in the paper, the dense program, plain, {:.1f} times, in the "
+               "geometric mean. These are plain programs on another processor, and the paper calls its AWPN \"totally "
+               "optimised\".\n"
+               "- On one thread the block-wise double layer is {:.1f} times as fast as the dense program.{}\n"
+               "- With the rows of section 4.2 the dense program takes {:.2f} of its time without.{}\n"
+               "- With the recursive subdivision it takes {:.2f} of its time with Algorithm 1, which the paper finds "
+               "the faster one.",
                bench::geometricMean(awpn), bench::geometricMean(serial), gain,
-               gain > 1 ? ": no grid of the whole box is cleared and read, a block stays in cache, and a vector of "
-                          "samples or voxels goes at once"
-                        : "",
+               gain > 1
+                   ? " It clears and reads no grid of the whole box, keeps a block in cache, and computes a vector "
+                     "of samples or voxels at once."
+                   : "",
                bench::geometricMean(byRows),
-               bench::geometricMean(byRows) > 0.95 ? ", where the paper gains much: today's compilers take what is the "
-                                                     "same along a row out of the loop "
-                                                     "by themselves"
+               bench::geometricMean(byRows) > 0.95 ? " The paper gains much by them; today's compilers take out of the "
+                                                     "loop what is the same along a row."
                                                    : "",
                bench::geometricMean(byRecursion)) +
-           (more.empty() ? ".\n"
-                         : fmt::format("; it rounds the number of rows up and takes more samples of: {}.\n",
+           (more.empty() ? "\n"
+                         : fmt::format(" Algorithm 1 rounds the number of rows up, and takes more samples of: {}.\n",
                                        fmt::join(more, ", ")));
 }
 
@@ -107,9 +109,11 @@ std::string textTable2(const json& data) {
         origins += fmt::format("{}{}: {}", origins.empty() ? "" : "; ", model, row["origin"].get<std::string>());
     }
     return fmt::format(
-               "Seconds at 251^3, one thread. *Dense*: the paper's program, without and with the rows of section 4.2, "
-               "and with the recursive subdivision; *AWPN*: the same kind of program with point-triangle distances "
-               "(`bench/paper/scatter.cpp`). Models: {}.\n\n",
+               "Seconds at 251^3, one thread.\n\n"
+               "- *Dense*: the paper's program, without and with the rows of section 4.2, and with the recursive "
+               "subdivision.\n"
+               "- *AWPN*: the same kind of program with point-triangle distances (`bench/paper/scatter.cpp`).\n"
+               "- Models: {}.\n\n",
                origins) +
            table({"model", "triangles [K], paper / here", "AWPN, paper", "AWPN", "double layer, paper", "dense, plain",
                   "dense", "dense, recursive", "samples, Algorithm 1 / recursive"},

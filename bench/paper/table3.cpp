@@ -62,21 +62,21 @@ std::string textTable3(const json& data) {
         rows.push_back(cells);
     }
     return fmt::format(
-               "OpenCL at {}^3, half width 2. The paper gives the kernels' seconds by the device's clock, on a {}; "
-               "here the kernels, then the whole build, mesh in memory to grid in memory, the host's part on {} "
-               "threads.\n\n",
+               "OpenCL at {}^3, half width 2. The paper gives the kernels' seconds by the device's clock, on a {}. "
+               "Here "
+               "the first number is the kernels', and the second one that of the whole build, from a mesh in memory to "
+               "a grid in memory. The host's part runs on {} threads.\n\n",
                tableNodes, published::processor, threads) +
            table({"model", "device", "prism [11], paper", "prism", "double layer, paper", "double-layer", "exact",
                   "prism's kernels over double-layer's / exact's"},
                  rows) +
-           "\nThe paper starts a work-item for each triangle and ran on all cores of its Xeon; here a work-item fills "
-           "a "
-           "block of voxels, on the compute units named.\n" +
+           "\nThe paper starts a work-item for each triangle, and ran on all cores of its Xeon. Here a work-item fills "
+           "a block of voxels, on the compute units named.\n" +
            (hosts.empty()
                 ? ""
-                : fmt::format("\nThe prism method needs the neighbours of each triangle, which the host finds: "
-                              "the larger part of its whole build is the host's where the model is {}.\n",
-                              fmt::join(hosts, " or ")));
+                : fmt::format("\nThe prism method needs the neighbours of each triangle, which the host finds. The "
+                              "host's part of its whole build is the larger one for: {}.\n",
+                              fmt::join(hosts, ", ")));
 }
 
 std::vector<std::string> behindTable3(const json& data) {

@@ -146,19 +146,16 @@ std::string textTable4(const json& data) {
         head.push_back(fmt::format("exact, OpenCL {}, kernels / whole", i + 1));
     memoryHead.push_back("active voxels [M]");
     return fmt::format(
-               "The circular box ({} triangles here); seconds, double layer with half width 2. Here it is made as high "
-               "as its grid, by a scale of its own for each axis, on the first three grids too; in Tables 2 and 3 one "
-               "scale holds for all axes. Steps are the same along all axes. TBB, and the host's part of OpenCL, on {} "
-               "threads.{}\n\n",
+               "The circular box ({} triangles here); seconds, double layer with half width 2. A scale for each axis "
+               "makes it as high as its grid, on the first three grids too. In Tables 2 and 3 one scale holds for all "
+               "axes. Steps are the same along all axes. TBB, and the host's part of OpenCL, run on {} threads.{}\n\n",
                data["triangles"].get<int>(), threads, legend(devices)) +
-           table(head, times) + "\nMost memory in use at once [MiB], in addition to the mesh:\n\n" +
-           table(memoryHead, memory) +
+           table(head, times) + "\nPeak memory [MiB], in addition to the mesh:\n\n" + table(memoryHead, memory) +
            fmt::format(
-               "\nThe serial program clears and reads two grids of the whole box, so that its time grows with the box; "
-               "here both time and memory grow with the surface, and no grid runs out of memory (on TBB {:.0f} MiB at "
-               "most). "
-               "The paper's ratios set all cores of a {} and their vectors against one core without; these, {} threads "
-               "or a device's compute units.{}\n",
+               "\nThe serial program clears and reads two grids of the whole box, so its time grows with the box. Here "
+               "time and memory grow with the surface, and no grid runs out of memory (at most {:.0f} MiB on TBB). The "
+               "paper's ratios compare all cores of a {} and their vectors with one core without vectors. The ratios "
+               "here compare {} threads, or a device's compute units, with one core.{}\n",
                largest, published::processor, threads, gpu ? "" : " No GPU was at hand for the Tesla's column.");
 }
 

@@ -94,10 +94,11 @@ std::string textTable5(const json& data) {
             head.push_back(fmt::format("OpenCL {}, {}", i + 1, what));
     head.insert(head.end(), {"TBB, double-layer", "TBB, exact", "serial (dense)", "samples, all / of one triangle"});
     return fmt::format(
-               "A sphere of {} triangles at {}^3, seconds; TBB, and the host's part of OpenCL, on {} threads.{} The "
-               "paper does not say how large its sphere is, on which "
-               "the variance of areas (Eq. 5) depends: here it fills the grid, with a radius of {:.2f} in a box of "
-               "side {}, and its triangles are small around one pole and large around the other.\n\n",
+               "A sphere of {} triangles at {}^3, seconds. TBB, and the host's part of OpenCL, run on {} threads.{} "
+               "The "
+               "variance of areas (Eq. 5) depends on the size of the sphere, which the paper does not state. Here it "
+               "fills the grid, with a radius of {:.2f} in a box of side {}. Its triangles are small around one pole "
+               "and large around the other.\n\n",
                data["rows"][0]["triangles"].get<int>(), tableNodes, threads, legend(data["rows"][0]["devices"]),
                data["radius"].get<double>(), boxSide) +
            table(head, rows) +

@@ -8,6 +8,7 @@ out=build/docs
 rm -rf "$out"
 mkdir -p "$out/source" "$out/doxygen"
 doxygen docs/site/Doxyfile
+python3 docs/site/check_documented.py "$out/doxygen/xml"
 # the pages and what they link, where Sphinx finds nothing else: it follows links into all folders
 ln -s "$PWD"/{README.md,CHANGELOG.md,CONTRIBUTING.md,SECURITY.md,RELEASE.md,LICENSE,docs} "$out/source/"
 /usr/bin/sphinx-build -q -W --keep-going -b html -d "$out/doctrees" -c docs/site "$out/source" "$out/html"

@@ -198,7 +198,7 @@ TEST_CASE("closest, inside and sample have the side of the winding number where 
     CHECK(wrong <= close / 2000);
 }
 
-TEST_CASE("closest, inside and sample have the side of the winding number on public meshes that meet themselves") {
+TEST_CASE("closest, inside and sample have the side of the winding number on public meshes that self-intersect") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     for (const char* name : {"../cases/sliver110.obj", "../cases/crossed-bars.obj", "diff_ring.stl"}) {

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: results.py SOURCE: checks that measured tables stand in docs/results/ and docs/paper.md alone, that each page there
-says how its figures were measured and with which bilayer, that nothing is "not recorded", that docs/results.md and docs/README.md link all of these pages, and that other pages quote
-times and ratios with a link to the results that have them."""
+says how its figures were measured and with which bilayer, that nothing is "not recorded", that docs/results.md and docs/README.md link all of these pages, that docs/results.md has their
+first and last dates and their kinds of machines, and that other pages quote times and ratios with a link to the results that have
+them."""
 
 import re
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 
 CONDITIONS = ["command", "machine", "date", "versions", "compared with"]
 DATE = re.compile(r"\d{4}-\d\d-\d\d")
+MACHINE = re.compile(r"EPYC|Xeon|NVIDIA \w+")
 VERSION = re.compile(r"\bbilayer (?:\d+\.\d+\.\d+|([0-9a-f]{8}))\b")  # or a revision
 UNKNOWN = re.compile(r"not recorded|not known|unknown|which, is not", re.I)  # of a condition
 TABLE = re.compile(r"^(\|[^\n]*)\n\|[ :|-]+\|\n((?:\|[^\n]*\n)*)", re.M)
@@ -43,13 +45,41 @@ def faults_of_results(name, page):
         yield from (f"{name}: the {row} is '{value}'" for row, value in rows if UNKNOWN.search(value) or not value)
 
 
+def conditions_of(page):
+    """The dates and the machines that a page's conditions name; the repeated paper has its conditions in lines."""
+    tabled = [row for head, rows in tables(page) if head == "| conditions | |" for row in rows]
+    lines = re.findall(r"^\*`\./run paper [^\n]*?UTC|^Measured on: [^\n]*", page, re.M)
+    named = {kind: " ".join(row[1] for row in tabled if row[0] == kind) for kind in ("date", "machine")}
+    return DATE.findall(named["date"] or "\n".join(lines)), MACHINE.findall(named["machine"] or "\n".join(lines))
+
+
+def faults_of_paper(root):
+    """Parts of the repeated paper that do not name the bilayer that was measured."""
+    for line in re.findall(r"^\*`\./run paper [^\n]*", (root / "docs" / "paper.md").read_text(), re.M):
+        if not VERSION.search(line):
+            yield f"docs/paper.md names no version or revision of bilayer: {line}"
+
+
+def faults_of_index(root):
+    """Rows of docs/results.md whose dates or machines are not those of the page."""
+    index = next(rows for head, rows in tables((root / "docs" / "results.md").read_text()) if "| date | machine |" in head)
+    for row in index:
+        link = LINK.search(row[0])[1]
+        dates, machines = conditions_of((root / "docs" / link).read_text())
+        if set(DATE.findall(row[3])) != {min(dates), max(dates)}:
+            yield f"docs/results.md: {link} was measured from {min(dates)} to {max(dates)}, not {row[3]}"
+        if not set(MACHINE.findall(row[4])) == set(machines):
+            yield f"docs/results.md: the machines of {link} are {sorted(set(machines))}, not {row[4]}"
+
+
 def faults_of_revisions(root):
     """Revisions that the history does not have. A copy without history is not asked."""
-    named = {rev for path in (root / "docs" / "results").glob("*.md") for rev in VERSION.findall(path.read_text()) if rev}
+    pages = [*(root / "docs" / "results").glob("*.md"), root / "docs" / "paper.md"]
+    named = {rev for path in pages for rev in VERSION.findall(path.read_text()) if rev}
     shallow = subprocess.run(["git", "rev-parse", "--is-shallow-repository"], cwd=root, capture_output=True, text=True).stdout.strip()
     for revision in sorted(named if shallow == "false" else ()):
         if subprocess.run(["git", "cat-file", "-e", f"{revision}^{{commit}}"], cwd=root, stderr=subprocess.DEVNULL).returncode:
-            yield f"docs/results: there is no revision {revision}"
+            yield f"docs/results or docs/paper.md: there is no revision {revision}"
 
 
 def is_results(root, path):
@@ -102,6 +132,8 @@ def faults(root):
         for index in ("results.md", "README.md"):
             if f"(results/{path.name}" not in (docs / index).read_text():
                 yield f"docs/{index} does not link results/{path.name}"
+    yield from faults_of_index(root)
+    yield from faults_of_paper(root)
     yield from faults_of_revisions(root)
     for path in [*sorted(root.glob("*.md")), *sorted(docs.rglob("*.md"))]:
         if "not recorded" in path.read_text():

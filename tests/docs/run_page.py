@@ -6,7 +6,7 @@ outputs with those on the page. --write puts the outputs of this run into the pa
 the page needs is not installed.
 
 Commands run as on a reader's machine, except for these, which tests/docs/stand-ins replaces: `./run`, which has built
-everything; `sudo apt install`, which only looks; `sudo cmake --install`, which installs into SCRATCH.
+everything; `sudo apt install`, which only looks; `sudo cmake --install`, which installs below SCRATCH.
 
 With --packages, in a clean root (tests/package/debian.sh), all commands are real but `./run`: its packages are in DIR.
 --from leaves out what stands before a heading.
@@ -63,14 +63,14 @@ def script(page, folder):
     return "\n".join(lines) + "\n", expected
 
 
-def environment(options):
+def environment(options, home):
     """Finds what the installation page has installed, as /usr/local is found without any setting."""
     if options.packages:
-        return dict(os.environ, HOME=str(options.scratch), BILAYER_SOURCE=str(options.source))
+        return dict(os.environ, HOME=str(home), BILAYER_SOURCE=str(options.source))
     installed = options.scratch / "installed" / "usr" / "local"
     python = next(installed.glob("lib/python3*/*-packages"), None)
     stand_ins = options.source / "tests" / "docs" / "stand-ins"
-    result = dict(os.environ, HOME=str(options.scratch), DESTDIR=str(options.scratch / "installed"),
+    result = dict(os.environ, HOME=str(home), BILAYER_INSTALL_ROOT=str(options.scratch / "installed"),
                   PATH=f"{stand_ins}:{installed}/bin:/usr/bin:/bin", CMAKE_PREFIX_PATH=str(installed), CMAKE_GENERATOR="Ninja",
                   CMAKE_TOOLCHAIN_FILE=str(options.source / "tests" / "docs" / "toolchain.cmake"),
                   BILAYER_SOURCE=str(options.source))
@@ -96,7 +96,9 @@ def main():
     page = path.read_text()
     folder = options.scratch / options.page.replace("/", "-").removesuffix(".md") / "checkout"
     shutil.rmtree(folder.parent, ignore_errors=True)
+    home = folder.parent / "home"
     folder.mkdir(parents=True)
+    home.mkdir()
     (folder / "build").mkdir()
     (folder / "build" / "release").symlink_to(options.build)
     if options.packages:
@@ -110,7 +112,7 @@ def main():
 
     begin = page.index(f"## {options.heading}\n") if options.heading else 0
     text, expected = script(page[begin:], folder)
-    result = subprocess.run(["bash", "-c", text], cwd=folder, env=environment(options), text=True, timeout=TIME_LIMIT,
+    result = subprocess.run(["bash", "-c", text], cwd=folder, env=environment(options, home), text=True, timeout=TIME_LIMIT,
                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     if result.returncode:
         print(result.stdout)

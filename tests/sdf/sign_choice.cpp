@@ -236,7 +236,7 @@ TEST_CASE("a clean solid has no conflict however narrow its band") {
             }
 }
 
-TEST_CASE("after a conflict, surfaces that meet themselves get winding numbers, doubled sheets a flood") {
+TEST_CASE("after a conflict, surfaces that self-intersect get winding numbers, doubled sheets a flood") {
     struct Case {
         const char* name;
         Sign sign;
