@@ -24,7 +24,7 @@ namespace detail {
 extern const char* const player_html;
 extern const char* const player_scene_js;
 extern const char* const player_js;
-}
+}  // namespace detail
 }  // namespace bilayer
 
 namespace bilayer::demo {

@@ -65,8 +65,8 @@ void WindingInBall::addTriangles(const Node& leaf) {
 }
 
 // A displacement d of the point is one of -d of all triangles: the moments of the cluster about its centre, less d, are
-// polynomials in d, and so is the expansion of WindingCluster. Its bound holds for |s - d| in place of |s|, whose square
-// integrates to at most (sqrt(spread) + radius sqrt(total))^2.
+// polynomials in d, and so is the expansion of WindingCluster. Its bound holds for |s - d| in place of |s|, whose
+// square integrates to at most (sqrt(spread) + radius sqrt(total))^2.
 void WindingInBall::addFar(const Node& node, const glm::dvec3& toCentre, double radius) {
     const double squared = glm::dot(toCentre, toCentre), distance = std::sqrt(squared);
     const double t = (node.radius + radius) / distance, unit = 1 / (4 * glm::pi<double>() * squared);
