@@ -173,7 +173,7 @@ class Field {
 /// refers to the field's memory, so the field or a copy of it must outlive it.
 class FieldSampler {
   public:
-    explicit FieldSampler(const Field& field) noexcept;
+    explicit FieldSampler(const Field& field) noexcept;  ///< the field or a copy of it must outlive the sampler
     explicit FieldSampler(Field&&) = delete;
 
     /// Distance and gradient at a point in field coordinates [m]. Equals Field::sample() bit for bit.
