@@ -27,7 +27,7 @@ using openvdb::Coord;
 using openvdb::FloatTree;
 using Accessor = openvdb::FloatGrid::ConstAccessor;
 
-constexpr int side = FieldLayout::side, stride = FieldLayout::stride;
+constexpr int side = FieldLayout::side;
 constexpr std::int64_t maxBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
 constexpr int blockParts = Clearance::blockParts;
 constexpr int minSteps = 126;  // from 0 to the end of the band, for the stored minima
