@@ -170,14 +170,14 @@ class PointSweep {
     /// Whether a point passes an open surface with its body ahead of it.
     /// @param outward  normal of its body
     bool leaves(const glm::vec3& outward, const SurfaceEntry& entry) const {
-        return std::is_same_v<Surface, SheetSurface> && glm::dot(outward, entry.normal) > maxFacing;
+        return Surface::isOpen && glm::dot(outward, entry.normal) > maxFacing;
     }
 
     /// The displacement to the surface of a point that starts inside; zero if it starts outside, nothing if unknown.
     /// @param inner    the test point
     /// @param outward  normal of its body
     std::optional<glm::vec3> wayOut(const glm::vec3& inner, const glm::vec3& outward, float radius) const {
-        if constexpr (std::is_same_v<Surface, SheetSurface>) {
+        if constexpr (Surface::isOpen) {
             return backThroughSheet(inner, outward);
         } else {
             const glm::vec3 from = transforms_.front()(inner);

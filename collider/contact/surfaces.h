@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The surfaces that points of moving bodies enter, each in its own coordinates and units. All have
 //
+// - bool isOpen: whether the surface has no inside;
 // - std::optional<SurfaceEntry> entry(from, to, radius): where a sphere enters on a straight path; its start if inside;
 // - std::optional<glm::vec3> depenetration(point, radius): the displacement to the surface of a sphere that is inside;
-//   none if unknown. An open surface has no inside and no such function;
+//   none if unknown. An open surface has no such function;
 // - bool isNear(from, to, radius): whether a sphere may come near on a straight path.
 //
 // Only fields are entered by spheres with a radius, and by points where they are at the start.
@@ -26,6 +27,8 @@ struct SurfaceEntry {
 
 class FieldSurface {
   public:
+    static constexpr bool isOpen = false;
+
     FieldSurface(const Collider& collider, float voxel) : field_(collider.field()), voxel_(voxel) {}
 
     std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float radius) const;
@@ -42,6 +45,8 @@ class FieldSurface {
 
 class ConvexSurface {
   public:
+    static constexpr bool isOpen = false;
+
     ConvexSurface(const Convex& convex, float voxel) : convex_(convex), voxel_(voxel) {}
 
     std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
@@ -55,6 +60,8 @@ class ConvexSurface {
 
 class PlaneSurface {
   public:
+    static constexpr bool isOpen = false;
+
     PlaneSurface(const HalfSpace& solid, float voxel) : solid_(solid), voxel_(voxel) {}
 
     std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
@@ -68,9 +75,10 @@ class PlaneSurface {
     float voxel_;
 };
 
-/// An open surface, which has no inside.
 class SheetSurface {
   public:
+    static constexpr bool isOpen = true;
+
     SheetSurface(const TriangleSheet& sheet, float) : sheet_(sheet) {}
 
     std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;

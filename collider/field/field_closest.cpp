@@ -10,14 +10,15 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <bilayer/collider/field.h>
 #include "collider/field/batch.h"
 #include "collider/field/field_data.h"
 #include "collider/field/mesh_winding.h"
-#include "collider/field/outer_bound.h"
 #include "collider/field/path.h"
+#include "collider/field/zero_answers.h"
 #include "collider/field/zero_set.h"
 #include "sdf/sign/sign_choice.h"
 
@@ -55,6 +56,16 @@ glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
         return length > 0 ? glm::vec3(nearest.normal * ((flipped ? -1 : 1) / length)) : glm::vec3(0, 0, 1);
     }
     return glm::vec3(nearest.offset * ((inside ? 1 : -1) / distance));
+}
+
+ClosestPoint closestWithoutMesh(const FieldData& field, const glm::vec3& point, float maxDistance) {
+    const auto nearest = [&](const glm::dvec3& from, double reach) -> std::optional<ZeroPoint> {
+        const auto position = nearestZero(field, from, reach);
+        if (!position) return std::nullopt;
+        return ZeroPoint{*position, zeroNormal(field, *position)};
+    };
+    const auto isInside = [&] { return field.sample(field.toLocal(point)).distance < 0; };
+    return closestZero(field, point, maxDistance, nearest, isInside);
 }
 
 }  // namespace
@@ -183,7 +194,7 @@ std::uint32_t FieldData::orBeyond(std::uint32_t part, const EntryPlace& place, c
 }
 
 ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const {
-    if (!mesh) return closestZero(point, maxDistance);
+    if (!mesh) return closestWithoutMesh(*this, point, maxDistance);
     if (!(maxDistance >= 0)) return {};
     const glm::dvec3 local = toLocal(point);
     fetchSide(local);
@@ -192,24 +203,6 @@ ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const
     if (place.entries)
         part = mesh->nearestPart(glm::dvec3(point), std::min(boundOf(maxDistance), entries.reach()), place);
     return closestOn(orBeyond(part, place, point, maxDistance), point, maxDistance);
-}
-
-glm::dvec3 FieldData::approachedPoint(const glm::dvec3& local) const {
-    return detail::approachedPoint(*this, local);
-}
-
-ClosestPoint FieldData::closestZero(const glm::vec3& point, float maxDistance) const {
-    const glm::dvec3 local = toLocal(point);
-    if (!std::isfinite(local.x + local.y + local.z) || !(maxDistance >= 0)) return {};
-    const glm::dvec3 from = approachedPoint(local);
-    const double reach = double(maxDistance) * perMetre;
-    const auto nearest = nearestZero(*this, from, from == local ? reach : std::numeric_limits<double>::infinity());
-    if (!nearest || glm::distance(local, *nearest) > reach) return {};
-    const float distance = toFloat(glm::distance(local, *nearest) * voxel);
-    return {.distance = sample(local).distance < 0 ? -distance : distance,
-            .position = toWorld(*nearest),
-            .normal = glm::vec3(zeroNormal(*this, *nearest)),
-            .found = true};
 }
 
 ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noexcept {

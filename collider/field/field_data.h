@@ -87,11 +87,6 @@ struct FieldData : FieldLayout {
         std::uint32_t xBlocks;       ///< count of directory entries between neighbouring blocks along x
     } lanes;
 
-    // Local places are in voxels from the directory's first voxel. In double they are exact enough at any distance from
-    // the origin.
-    glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) * perMetre; }
-    glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
-
     /// Computes the gradient where the distance is at most `gradientReach` [m].
     Sample sample(const glm::dvec3& local, float gradientReach) const noexcept {
         return kernels.sampleAt(*this, local, gradientReach);
@@ -126,8 +121,6 @@ struct FieldData : FieldLayout {
 
     /// The closest point of the mesh, or of the zero set if there is no mesh.
     ClosestPoint closest(const glm::vec3& point, float maxDistance) const;
-    glm::dvec3 approachedPoint(const glm::dvec3& local) const;
-    ClosestPoint closestZero(const glm::vec3& point, float maxDistance) const;
 
     bool inside(const glm::vec3& point) const;
 

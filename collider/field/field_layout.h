@@ -36,6 +36,11 @@ struct FieldFrame {
     float voxelSize = 0, exteriorWidth = 0, interiorWidth = 0;  ///< [m]
     Bounds bounds{};                                            ///< of all points in the band [m]
 
+    // Local places are in voxels from the directory's first voxel. In double they are exact enough at any distance from
+    // the origin.
+    glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) * perMetre; }
+    glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
+
     glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
     std::size_t entries() const { return std::size_t(blocks.x) * blocks.y * blocks.z; }
     std::size_t entryOf(const glm::ivec3& block) const {

@@ -12,6 +12,7 @@
 #include "collider/field/ray_paths.h"
 #include "collider/field/sphere_tracing.h"
 #include "collider/field/triangle_tests.h"
+#include "collider/field/zero_answers.h"
 #include "collider/field/zero_set.h"
 
 namespace bilayer {
@@ -37,11 +38,6 @@ RayHit hitAtStart(const FieldData& field, const glm::vec3& origin, const glm::dv
                               direction);
 }
 
-// In voxels from the directory's first voxel.
-Path toLocal(const FieldData& field, const Path& path) {
-    return {(path.origin - field.origin) * field.perMetre, path.direction, path.length * field.perMetre};
-}
-
 std::optional<RayHit> hitMesh(const MeshTree& mesh, const Path& path) {
     const auto hit = firstHit(mesh, path);
     if (!hit) return std::nullopt;
@@ -49,14 +45,12 @@ std::optional<RayHit> hitMesh(const MeshTree& mesh, const Path& path) {
 }
 
 std::optional<RayHit> hitZero(const FieldData& field, const Path& path) {
-    const auto part = partIn(toLocal(field, path), glm::dvec3(0), field.extent());
-    if (!part) return std::nullopt;
-    const auto along = firstInside(field, part->path);
-    if (!along) return std::nullopt;
-    const glm::dvec3 position = part->path.at(*along), normal = zeroNormal(field, position);
-    return RayHit{.distance = toFloat((part->from + *along) * field.voxel),
-                  .position = field.toWorld(position),
-                  .normal = glm::vec3(normal != glm::dvec3(0) ? normal : -path.direction)};
+    return detail::hitZero(field, path, [&](const Path& local) -> std::optional<ZeroPoint> {
+        const auto along = firstInside(field, local);
+        if (!along) return std::nullopt;
+        const glm::dvec3 position = local.at(*along);
+        return ZeroPoint{position, zeroNormal(field, position), *along};
+    });
 }
 
 std::optional<RayHit> touchMesh(const FieldData& field, const Path& path, double radius) {
@@ -75,7 +69,7 @@ std::optional<RayHit> touchZero(const FieldData& field, const Path& path, double
     if (!part) return std::nullopt;
     auto touch = firstZeroTouch(field, part->path, reach);
     if (!touch) return std::nullopt;
-    const glm::dvec3 centre = part->path.at(touch->along), from = field.approachedPoint(centre);
+    const glm::dvec3 centre = part->path.at(touch->along), from = approachedPoint(field, centre);
     // from so far away several zeros may be equally near: take the nearest one
     if (from != centre) touch->position = nearestZero(field, from, std::numeric_limits<double>::infinity()).value();
     return RayHit{.distance = toFloat((part->from + touch->along) * field.voxel),

@@ -7,6 +7,7 @@
 #include <glm/vec3.hpp>
 
 #include <bilayer/collider/query.h>
+#include "collider/field/field_layout.h"
 #include "collider/field/path.h"
 #include "sdf/base/finite.h"
 
@@ -18,6 +19,11 @@ inline bool isRay(const Ray& ray) {
 
 inline Path pathOf(const Ray& ray) {
     return {glm::dvec3(ray.origin), glm::normalize(glm::dvec3(ray.direction)), double(ray.maxDistance)};
+}
+
+/// A path in voxels from the directory's first voxel.
+inline Path toLocal(const FieldFrame& frame, const Path& path) {
+    return {(path.origin - frame.origin) * frame.perMetre, path.direction, path.length * frame.perMetre};
 }
 
 /// The hit of a ray that starts inside.

@@ -2,9 +2,8 @@
 // Queries of fields in tiles.
 // Tested by tests/tools/tiled_field.cpp through TiledField.
 #include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <limits>
+#include <cstddef>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <vector>
@@ -12,10 +11,10 @@
 #include <bilayer/collider/field.h>
 #include "collider/field/batch.h"
 #include "collider/field/field_data.h"
-#include "collider/field/outer_bound.h"
 #include "collider/field/ray_paths.h"
 #include "collider/field/tiled_field_data.h"
 #include "collider/field/tiled_search.h"
+#include "collider/field/zero_answers.h"
 
 namespace bilayer {
 
@@ -56,37 +55,17 @@ bool TiledField::inside(const glm::vec3& point) const {
     return sample(point).distance < 0;
 }
 
-// As FieldData::closestZero().
 ClosestPoint TiledField::closest(const glm::vec3& point, float maxDistance) const {
-    const FieldFrame& frame = data_->frame();
-    const glm::dvec3 local = (glm::dvec3(point) - frame.origin) * frame.perMetre;
-    if (!std::isfinite(local.x + local.y + local.z) || !(maxDistance >= 0)) return {};
-    const glm::dvec3 from = approachedPoint(frame, local);
-    const double reach = double(maxDistance) * frame.perMetre;
-    const auto nearest = nearestZero(*data_, from, from == local ? reach : std::numeric_limits<double>::infinity());
-    if (!nearest || glm::distance(local, nearest->position) > reach) return {};
-    const float distance = toFloat(glm::distance(local, nearest->position) * frame.voxel);
-    return {.distance = inside(point) ? -distance : distance,
-            .position = glm::vec3(nearest->position * frame.voxel + frame.origin),
-            .normal = glm::vec3(nearest->normal),
-            .found = true};
+    const auto nearest = [&](const glm::dvec3& from, double reach) { return nearestZero(*data_, from, reach); };
+    return closestZero(data_->frame(), point, maxDistance, nearest, [&] { return inside(point); });
 }
 
-// As Field::raycast() without the mesh.
 std::optional<RayHit> TiledField::raycast(const Ray& ray) const {
     if (!isRay(ray)) return std::nullopt;
-    const FieldFrame& frame = data_->frame();
     const Path path = pathOf(ray);
     if (const Sample start = sample(ray.origin); start.distance < 0)
         return hitAtStart(start, ray.origin, path.direction);
-    const Path local{(path.origin - frame.origin) * frame.perMetre, path.direction, path.length * frame.perMetre};
-    const auto part = partIn(local, glm::dvec3(0), frame.extent());
-    if (!part) return std::nullopt;
-    const auto hit = firstInside(*data_, part->path);
-    if (!hit) return std::nullopt;
-    return RayHit{.distance = toFloat((part->from + hit->along) * frame.voxel),
-                  .position = glm::vec3(hit->position * frame.voxel + frame.origin),
-                  .normal = glm::vec3(hit->normal != glm::dvec3(0) ? hit->normal : -path.direction)};
+    return hitZero(data_->frame(), path, [&](const Path& local) { return firstInside(*data_, local); });
 }
 
 float TiledField::voxelSize() const noexcept {

@@ -22,7 +22,7 @@ constexpr int side = FieldFrame::side;
 
 // Of a place along one axis, in the fixed point of samples. Unsigned: negative, huge and NaN coordinates are out of
 // range of any directory.
-std::uint32_t blockAt(double perMetre, double offset, float coordinate) {
+std::uint32_t blockAlong(double perMetre, double offset, float coordinate) {
     const auto word = [](double fixed) { return std::uint32_t(std::bit_cast<std::uint64_t>(fixed) >> 32); };
     return word(double(coordinate) * perMetre + offset) - word(FieldData::fixedPoint);
 }
@@ -60,7 +60,6 @@ void TiledFieldData::readSurface() {
         placed_.push_back(
             {.first{}, .blocks{}, .lower{}, .upper{}, .shift{}, .surface = before, .surfaceEnd = surface_.size()});
     }
-    if (surface_.empty()) throw std::invalid_argument("the field in tiles has no voxel in its band");
 }
 
 // Reads the smallest tile for what all tiles share.
@@ -75,7 +74,7 @@ void TiledFieldData::readFrame() {
         lower = glm::min(lower, record.band.first);
         upper = glm::max(upper, record.band.end - 1);
     }
-    if (!smallest) throw std::invalid_argument("the field in tiles has no voxel in its band");
+    if (!smallest || surface_.empty()) throw std::invalid_argument("the field in tiles has no voxel in its band");
     manifest_.tiles[*smallest].field.requireIntact();
     const LevelSet tile(readTile(manifest_.tiles[*smallest].field.path).grids);
     const openvdb::FloatGrid& grid = *tile.grids().distance;
@@ -133,7 +132,7 @@ glm::ivec3 TiledFieldData::placeOf(const glm::ivec3& block) const {
 std::optional<std::size_t> TiledFieldData::tileOf(const glm::vec3& point) const {
     glm::ivec3 block;
     for (int axis = 0; axis < 3; ++axis) {
-        const std::uint32_t at = blockAt(frame_.perMetre, fixedOffset_[axis], point[axis]);
+        const std::uint32_t at = blockAlong(frame_.perMetre, fixedOffset_[axis], point[axis]);
         if (at >= std::uint32_t(frame_.blocks[axis])) return std::nullopt;
         block[axis] = int(at);
     }
@@ -141,14 +140,13 @@ std::optional<std::size_t> TiledFieldData::tileOf(const glm::vec3& point) const 
 }
 
 Sample TiledFieldData::sample(const glm::vec3& point, std::optional<std::size_t> tile) const {
-    if (!tile) return {.distance = boundOutside(frame_, (glm::dvec3(point) - frame_.origin) * frame_.perMetre)};
+    if (!tile) return {.distance = boundOutside(frame_, frame_.toLocal(point))};
     return sampleIn(*hold(*tile), *tile, point);
 }
 
 // In voxels, the step from the field's first voxel to the tile's is exact.
 Sample TiledFieldData::sampleIn(const FieldData& data, std::size_t tile, const glm::vec3& point) const {
-    const glm::dvec3 local = (glm::dvec3(point) - frame_.origin) * frame_.perMetre;
-    return data.kernels.sampleInPart(data, {point, local - placed_[tile].shift});
+    return data.kernels.sampleInPart(data, {point, frame_.toLocal(point) - placed_[tile].shift});
 }
 
 // As FieldData::memoryBytes() will be, but for the rounding of allocations.

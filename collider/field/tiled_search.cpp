@@ -56,7 +56,7 @@ class TileWalk {
 
 }  // namespace
 
-std::optional<TiledZero> nearestZero(const TiledFieldData& field, const glm::dvec3& point, double reach) {
+std::optional<ZeroPoint> nearestZero(const TiledFieldData& field, const glm::dvec3& point, double reach) {
     std::vector<std::pair<double, std::size_t>> byDistance;
     for (std::size_t tile = 0; tile < field.tileCount(); ++tile) {
         const PlacedTile& placed = field.placed(tile);
@@ -64,7 +64,7 @@ std::optional<TiledZero> nearestZero(const TiledFieldData& field, const glm::dve
         if (placed.hasSurface() && away <= reach) byDistance.emplace_back(away, tile);
     }
     std::sort(byDistance.begin(), byDistance.end());
-    std::optional<TiledZero> nearest;
+    std::optional<ZeroPoint> nearest;
     for (const auto& [away, tile] : byDistance) {
         if (away > reach) break;
         const glm::dvec3& shift = field.placed(tile).shift;
@@ -77,7 +77,7 @@ std::optional<TiledZero> nearestZero(const TiledFieldData& field, const glm::dve
     return nearest;
 }
 
-std::optional<TiledZero> firstInside(const TiledFieldData& field, const Path& path) {
+std::optional<ZeroPoint> firstInside(const TiledFieldData& field, const Path& path) {
     for (TileWalk walk(field, path); walk.isWithin(); walk.step()) {
         const PlacedTile& placed = field.placed(walk.tile());
         if (!placed.hasSurface()) continue;
@@ -86,7 +86,7 @@ std::optional<TiledZero> firstInside(const TiledFieldData& field, const Path& pa
                            std::max(0.0, walk.leave() - walk.enter())};
         if (const auto along = firstInside(*data, section)) {
             const glm::dvec3 position = section.at(*along);
-            return TiledZero{position + placed.shift, zeroNormal(*data, position), walk.enter() + *along};
+            return ZeroPoint{position + placed.shift, zeroNormal(*data, position), walk.enter() + *along};
         }
     }
     return std::nullopt;

@@ -8,19 +8,14 @@
 
 #include "collider/field/path.h"
 #include "collider/field/tiled_field_data.h"
+#include "collider/field/zero_answers.h"
 
 namespace bilayer::detail {
 
-/// A point of the zero set, with the outward unit normal; zero where the interpolant is flat.
-struct TiledZero {
-    glm::dvec3 position, normal;
-    double along = 0;  ///< distance along the path
-};
-
 /// The nearest point of the zero set within a radius, as nearestZero().
-std::optional<TiledZero> nearestZero(const TiledFieldData& field, const glm::dvec3& point, double reach);
+std::optional<ZeroPoint> nearestZero(const TiledFieldData& field, const glm::dvec3& point, double reach);
 
 /// The first place of a path in the field's box with a negative interpolant, as firstInside().
-std::optional<TiledZero> firstInside(const TiledFieldData& field, const Path& path);
+std::optional<ZeroPoint> firstInside(const TiledFieldData& field, const Path& path);
 
 }  // namespace bilayer::detail
