@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""usage: run_page.py [--write] [--given FILE] [--from HEADING] [--packages DIR] SOURCE BUILD SCRATCH PAGE
+"""usage: run_page.py [--write] [--given FILE] [--from HEADING] [--until HEADING] [--packages DIR]
+SOURCE BUILD SCRATCH PAGE
 
 Does what a page shows, in its order, in an empty folder: writes its files, runs its commands and its Python, and compares
 outputs with those on the page. --write puts the outputs of this run into the page instead. Exit status 4: something that
 the page needs is not installed.
 
-Commands run as on a reader's machine, except for these, which tests/docs/stand-ins replaces: `./run`, which has built
-everything; `sudo apt install`, which only looks; `sudo cmake --install`, which installs below SCRATCH.
+Commands run as on a reader's machine, except for these, which tests/docs/stand-ins replaces: `./run` other than `./run
+build`; `sudo apt`, which only looks; `sudo cmake --install`, which installs below SCRATCH.
 
 With --packages, in a clean root (tests/package/debian.sh), all commands are real but `./run`: its packages are in DIR.
---from leaves out what stands before a heading.
+--from leaves out what stands before a heading, --until that heading and what follows it.
 """
 
 import argparse
@@ -22,7 +23,7 @@ from pathlib import Path
 from page import blocks, commands, same_output
 
 SKIPPED = 4
-TIME_LIMIT = 300  # [s] of a page
+TIME_LIMIT = 900  # [s] of a page
 END = "== end of output =="
 
 
@@ -31,6 +32,7 @@ def parse():
     parser.add_argument("--write", action="store_true")
     parser.add_argument("--given", action="append", default=[], type=Path)
     parser.add_argument("--from", dest="heading")
+    parser.add_argument("--until")
     parser.add_argument("--packages", type=Path)
     for name in ("source", "build", "scratch"):
         parser.add_argument(name, type=lambda text: Path(text).resolve())
@@ -70,7 +72,7 @@ def environment(options, home):
     installed = options.scratch / "installed" / "usr" / "local"
     python = next(installed.glob("lib/python3*/*-packages"), None)
     stand_ins = options.source / "tests" / "docs" / "stand-ins"
-    result = dict(os.environ, HOME=str(home), BILAYER_INSTALL_ROOT=str(options.scratch / "installed"),
+    result = dict(os.environ, HOME=str(home), BILAYER_BUILD=str(options.build), BILAYER_INSTALL_ROOT=str(options.scratch / "installed"),
                   PATH=f"{stand_ins}:{installed}/bin:/usr/bin:/bin", CMAKE_PREFIX_PATH=str(installed), CMAKE_GENERATOR="Ninja",
                   CMAKE_TOOLCHAIN_FILE=str(options.source / "tests" / "docs" / "toolchain.cmake"),
                   BILAYER_SOURCE=str(options.source))
@@ -111,7 +113,8 @@ def main():
         shutil.copy(file, folder)
 
     begin = page.index(f"## {options.heading}\n") if options.heading else 0
-    text, expected = script(page[begin:], folder)
+    end = page.index(f"## {options.until}\n") if options.until else None
+    text, expected = script(page[begin:end], folder)
     result = subprocess.run(["bash", "-c", text], cwd=folder, env=environment(options, home), text=True, timeout=TIME_LIMIT,
                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     if result.returncode:

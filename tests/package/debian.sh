@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # usage: debian.sh DIR: installs the packages in DIR into a clean Debian 12 root, and uses them there as users do: the command
-# line, a program by CMake and one by pkg-config, the Python module. Exits with 4, which skips it, where no root can be made.
+# line, a program by CMake and one by pkg-config, the Python module, and all that the pages of docs/start tell. Exits with 4, which skips it, where no root can be made.
 set -euo pipefail
 source=$(cd "$(dirname "$0")/../.." && pwd)
 packages=$(cd "${1:?"the folder of the packages"}" && pwd)
@@ -23,7 +23,7 @@ mmdebstrap --variant=minbase --quiet "${options[@]}" bookworm "$root" || skip "m
 
 mkdir -p "$root/packages" "$root/user" "$root/source/docs/start" "$root/source/tests"
 cp "$source/run" "$root/source/"
-cp "$source/docs/start/install.md" "$root/source/docs/start/"
+cp "$source"/docs/start/*.md "$root/source/docs/start/"
 cp -r "$source/tests/docs" "$root/source/tests/"
 cp "$packages"/*.deb "$root/packages/"
 cp -r "$source/tests/package/consumer" "$root/user/"
@@ -70,15 +70,22 @@ for package in ("bilayer", "libbilayer-dev", "python3-bilayer"):
     assert "Apache License" in text and not missing, f"the copyright of {package} lacks the notices of {missing}"
 PYTHON
 
-echo "== removed without a trace"
+echo "== the pages of docs/start"
 apt-get purge -y -qq bilayer libbilayer-dev python3-bilayer >/dev/null 2>&1
-left=$(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*' -not -path '/source/*')
-[[ -z $left ]] || { echo "debian.sh: left behind: $left"; exit 1; }
-
-echo "== the commands of docs/start/install.md for packages"
 install sudo
 echo 'APT::Get::Assume-Yes "true";' >/etc/apt/apt.conf.d/yes
 mkdir /scratch
-python3 /source/tests/docs/run_page.py --from "As Debian packages" --packages /packages /source /nowhere /scratch docs/start/install.md
+do_page() { # PAGE [OPTIONS...]
+  echo "$@"
+  python3 /source/tests/docs/run_page.py "${@:2}" --packages /packages /source /nowhere /scratch "docs/start/$1.md"
+}
+do_page install --from "As Debian packages" --until "Remove the packages"
+for page in field bullet liquid python contacts; do do_page $page; done
+do_page install --from "Remove the packages"
+
+echo "== removed without a trace"
+left=$(find / -xdev -name '*bilayer*' -not -path '/packages/*' -not -path '/proc/*' -not -path '/var/*' -not -path '/user/*' \
+  -not -path '/source/*' -not -path '/scratch/*')
+[[ -z $left ]] || { echo "debian.sh: left behind: $left"; exit 1; }
 IN_ROOT
 echo "the packages work in a clean Debian 12"
