@@ -103,7 +103,24 @@ def reference(folder):
             yield f"\n```{{{directive}}} {name}\n{options}```\n"
 
 
+def indexed(page):
+    """The Python reference with entries of the index for its classes, functions and methods."""
+    owner, lines, opens = "", [], False
+    for line in page.splitlines():
+        heading, function = re.match(r"### `(\w+)`", line), opens and re.match(r"(\w+)\(", line)
+        if heading:
+            owner = heading.group(1)
+            lines += [f"```{{index}} single: {owner}; Python", "```", ""]
+        elif function and function.group(1) != owner:
+            lines[-1:] = [f"```{{index}} single: {owner}.{function.group(1)}; Python", "```", "", "```"]
+        opens = line == "```" and not opens
+        lines.append(line)
+    return "\n".join(lines)
+
+
 def add_to_page(app, name, source):
+    if name == "docs/python-reference":
+        source[0] = indexed(source[0])
     if name == "README":
         source[0] += contents()
     folder = re.search(r"^<!-- reference of (\S+) -->$", source[0], re.M)
