@@ -31,6 +31,7 @@ class PointsInField {
           other_(other),
           beyondBand_(options.exact || reachesBeyondBand(other, options.margin, range)),
           surface_(other.collider, options.exact, beyondBand_),
+          sampler_(surface_.field()),
           transform_(body, other),
           coarse_(transform_.intoCoarseCells(field())),
           relativeMotion_(body.pose, body.motion, other.pose, other.motion),
@@ -156,9 +157,9 @@ class PointsInField {
         }
     }
 
-    Sample sampleAt(const glm::vec3& at, ContactReport& report) const {
+    Sample sampleAt(const glm::vec3& at, ContactReport& report) {
         ++report.pointsTested;
-        return field().sampleWithin(at, reach_);
+        return sampler_.sample(at);
     }
 
     template <class Found>
@@ -216,6 +217,7 @@ class PointsInField {
     const Placed &body_, &other_;
     bool beyondBand_;  // the other surface is searched for from points beyond its band, too
     ContactField surface_;
+    FieldSampler sampler_;  // neighbours in the hierarchy of points are near each other
     BodyTransform transform_, coarse_;
     RelativeMotion relativeMotion_;
     Clearance clearance_;
