@@ -8,7 +8,7 @@ import bilayer
 GROUPS = {
     "Meshes": ["Mesh", "read_mesh", "inspect", "MeshReport", "as_mesh", "box", "sphere"],
     "Fields": ["build", "rebuild", "LevelSet", "Dense", "Sparse", "devices", "Cancelled", "DeviceError"],
-    "Queries": ["Field", "Samples", "ClosestPoints", "Hits"],
+    "Queries": ["Field", "TiledField", "Samples", "ClosestPoints", "Hits"],
     "Bodies": [
         "Pose", "Collider", "Shape", "with_body", "mass_properties", "MassProperties", "collide", "Contacts", "ContactCache",
         "distance", "distances", "BodyDistance", "time_of_impact", "Impact",

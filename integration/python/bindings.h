@@ -10,6 +10,7 @@ void addMesh(pybind11::module_& module);
 void addLevelSet(pybind11::module_& module);
 void addBuild(pybind11::module_& module);
 void addField(pybind11::module_& module);
+void addTiledField(pybind11::module_& module);
 void addPose(pybind11::module_& module);
 void addShape(pybind11::module_& module);
 void addCollider(pybind11::module_& module);

@@ -16,25 +16,12 @@
 #include "integration/python/define.h"
 #include "integration/python/field_docs.h"
 #include "integration/python/objects.h"
+#include "integration/python/queries.h"
 #include "integration/python/without_gil.h"
 #include "sdf/base/unit_tolerance.h"
 
 namespace bilayer::python {
 namespace {
-
-constexpr std::array<std::pair<const char*, Storage>, 2> storages{
-    {{"float32", Storage::float32}, {"fixed16", Storage::fixed16}}};
-/// Queries that parts of a batch must not separate. Closest points are found in groups of 64: any of several equally
-/// close features may be the answer, and it must be the library's.
-constexpr std::size_t group = 64;
-
-// A hit as numpy sees it.
-struct Hit {
-    bool hit = false;
-    float distance = std::numeric_limits<float>::infinity();
-    glm::vec3 position{std::numeric_limits<float>::quiet_NaN()}, normal{std::numeric_limits<float>::quiet_NaN()};
-    std::uint32_t triangle = noTriangle;
-};
 
 py::object sample(const FieldObject& field, const py::object& object) {
     const Floats points(object, "points", {3});
@@ -42,16 +29,7 @@ py::object sample(const FieldObject& field, const py::object& object) {
     answerInParts(samples.size(), group, [&](std::size_t begin, std::size_t end) {
         field.sample(points.points().subspan(begin, end - begin), std::span(samples).subspan(begin, end - begin));
     });
-    const Records<Sample> records(std::move(samples), points.shape());
-    return result("Samples", records.member(&Sample::distance), records.member(&Sample::gradient),
-                  records.member(&Sample::inBand));
-}
-
-// Where nothing was found, no member looks like an answer.
-void clearMissing(std::span<ClosestPoint> answers) {
-    constexpr float none = std::numeric_limits<float>::quiet_NaN();
-    for (ClosestPoint& answer : answers)
-        if (!answer.found) answer = {.position = glm::vec3(none), .normal = glm::vec3(none)};
+    return samplesOf(std::move(samples), points.shape());
 }
 
 // A limit for each point, or one for all of them, which is faster.
@@ -73,22 +51,7 @@ py::object closest(const FieldObject& field, const py::object& object, const py:
                   found);
         clearMissing(found);
     });
-    const Records<ClosestPoint> records(std::move(answers), shape);
-    return result("ClosestPoints", records.member(&ClosestPoint::distance), records.member(&ClosestPoint::position),
-                  records.member(&ClosestPoint::normal), records.member(&ClosestPoint::triangle),
-                  records.member(&ClosestPoint::feature), records.member(&ClosestPoint::index),
-                  records.member(&ClosestPoint::found));
-}
-
-// An array of the answers of a batch of yes-or-no questions, of this shape. Calls ask(begin, count, answers).
-template <class Ask>
-py::object flags(const Shape& shape, const Ask& ask) {
-    py::array_t<bool> array(shape);
-    bool* const answers = array.mutable_data();
-    answerInParts(std::size_t(array.size()), group, [&](std::size_t begin, std::size_t end) {
-        ask(begin, end - begin, std::span(answers + begin, end - begin));
-    });
-    return shape.empty() ? array[py::tuple()] : py::object(array);
+    return closestPointsOf(std::move(answers), shape);
 }
 
 py::object inside(const FieldObject& field, const py::object& object) {
@@ -97,46 +60,6 @@ py::object inside(const FieldObject& field, const py::object& object) {
         field.inside(points.points().subspan(begin, count), answers);
     });
 }
-
-// The hits of a batch of casts, of this shape. Calls cast(begin, count, hits).
-template <class Cast>
-py::object hits(const Shape& shape, std::size_t count, const Cast& cast) {
-    std::vector<Hit> all(count);
-    answerInParts(count, group, [&](std::size_t begin, std::size_t end) {
-        std::vector<std::optional<RayHit>> found(end - begin);
-        cast(begin, end - begin, std::span(found));
-        for (std::size_t i = begin; i < end; ++i)
-            if (const auto& hit = found[i - begin])
-                all[i] = {true, hit->distance, hit->position, hit->normal, hit->triangle};
-    });
-    const Records<Hit> records(std::move(all), shape);
-    return result("Hits", records.member(&Hit::hit), records.member(&Hit::distance), records.member(&Hit::position),
-                  records.member(&Hit::normal), records.member(&Hit::triangle));
-}
-
-struct Rays {
-    Rays(const py::object& from, const py::object& along, const py::object& reach)
-        : origins(from, "origins", {3}),
-          directions(along, "directions", {3}),
-          lengths(reach, "max_distance", {}, Range::positiveOrInfinite) {}
-
-    // Some rays, after broadcasting. Throws std::invalid_argument for a direction of zero length.
-    std::vector<Ray> make(std::size_t begin, std::size_t count) const {
-        const auto from = origins.points(), along = directions.points();
-        const auto reach = lengths.as<float>();
-        std::vector<Ray> rays(count);
-        for (std::size_t k = 0; k < count; ++k) {
-            const std::size_t i = begin + k;
-            if (along[i] == glm::vec3(0))
-                throw std::invalid_argument(directions.place(i) + " is zero, and must be a direction" +
-                                            directions.shapeText());
-            rays[k] = {from[i], along[i], reach[i]};
-        }
-        return rays;
-    }
-
-    Floats origins, directions, lengths;
-};
 
 py::object raycast(const FieldObject& field, const py::object& origins, const py::object& directions,
                    const py::object& maxDistance) {

@@ -38,6 +38,7 @@ no such device
     python::addLevelSet(module);
     python::addBuild(module);
     python::addField(module);
+    python::addTiledField(module);
     python::addPose(module);
     python::addShape(module);
     python::addCollider(module);

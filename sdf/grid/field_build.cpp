@@ -19,7 +19,6 @@
 #include "sdf/grid/sign_retry.h"
 #include "sdf/leaf/blocks.h"
 #include "sdf/leaf/build_options.h"
-#include "sdf/sign/sign_choice.h"
 
 namespace bilayer::detail {
 namespace {
@@ -84,8 +83,8 @@ FilledPart buildPart(const Mesh& mesh, const BuildOptions& options, const FieldP
         if (hasOwnSigns(options.method))
             field.fillWithOwnSigns();
         else
-            field.fill(mesh, options.sign, asAskedFor, options.method);
-        return FilledPart{field.grids(), field.signs().conflicts, field.faces(), field.border()};
+            field.fill(mesh, part.signs.method, part.signs.reason, options.method);
+        return FilledPart{field.grids(), field.signs().conflicts, field.compared(), field.faces(), field.border()};
     });
 }
 

@@ -29,13 +29,14 @@ LevelSet rebuildField(const LevelSet& old, const Mesh& oldMesh, const Mesh& newM
 struct FilledPart {
     std::shared_ptr<Grids> grids;  ///< possibly without any leaf
     std::size_t conflicts = 0;     ///< with a conflict, the signs are not those of the whole field
+    ComparedSigns compared{};      ///< if the part checks its normals
     FaceSides faces{};
     openvdb::FloatTree::Ptr border;  ///< borderOf()
 };
 
 /// Builds a part of a field from the triangles near it.
-/// @param options  for which triangles near a block determine the block: Method::doubleLayer, or Method::exact with
-///                 Sign::normals
+/// @param options  for which triangles near a block determine its distances: Method::doubleLayer, or Method::exact,
+///                 whose signs are those of the part
 /// Throws as build() does, and std::invalid_argument where only the whole mesh can decide a sign.
 FilledPart buildPart(const Mesh& mesh, const BuildOptions& options, const FieldPart& part);
 

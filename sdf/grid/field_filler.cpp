@@ -19,6 +19,7 @@
 #include "sdf/fill/double_layer.h"
 #include "sdf/fill/exact.h"
 #include "sdf/fill/pseudonormal.h"
+#include "sdf/grid/part_signs.h"
 #include "sdf/leaf/build_options.h"
 #include "sdf/mesh/orient.h"
 #include "sdf/mesh/unite.h"
@@ -62,18 +63,21 @@ void makePositive(openvdb::FloatGrid& distance) {
     });
 }
 
+// Maximum distance of a corrected voxel from the surface [m].
+float repairLimit(const BuildOptions& options) {
+    return enclosesSurface(options) ? options.voxelSize : 0;
+}
+
 // The normals of a balanced mesh that self-intersects can be wrong without a conflict, where two walls are near all
 // voxels between them. Signs of voxels within one voxel of the surface are corrected. Farther wrong regions may extend
 // beyond the band.
 void repair(openvdb::FloatGrid& distance, const Mesh& mesh, const BuildOptions& options, Progress& progress,
             FieldSigns& signs) {
-    const float limit = enclosesSurface(options) ? options.voxelSize : 0;
-    const SignRepair repair = repairSigns(distance, mesh, limit, &progress);
+    const SignRepair repair = repairSigns(distance, mesh, repairLimit(options), &progress);
     signs.conflicts += repair.refused;
     if (repair.repaired == 0) return;
     signs.name = nameOf(Sign::winding);
-    signs.reason = fmt::format("{}, but the surface intersects itself; {} voxels have the side of their winding number",
-                               signs.reason, repair.repaired);
+    signs.reason = repairedReason(signs.reason, repair.repaired);
 }
 
 }  // namespace
@@ -168,12 +172,18 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     times_.fill += part.lap();
     finish(assembler);
     progress_.poll();
-    if (sign == Sign::winding) signByWinding(*distance_, solids, widths, balanced(solids, &progress_), &progress_);
+    if (sign == Sign::winding && part_)
+        signPartByWinding(*distance_, mesh, widths, *part_, enclosesSurface(options_), progress_);
+    else if (sign == Sign::winding)
+        signByWinding(*distance_, solids, widths, balanced(solids, &progress_), &progress_);
     if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gapVoxels, widths, &progress_);
     if (byNormals) conflicts += assembler.conflicts(*distance_);
     signs_ = {nameOf(sign), reason, conflicts, undecided};
+    if (byNormals && part_ && part_->signs.check != NormalsCheck::none)
+        compared_ = comparePart(*distance_, mesh, *part_, repairLimit(options_), progress_);
+    if (part_ && !part_->signs.name.empty()) signs_.name = part_->signs.name;
     const bool isKnownToBeClean = options_.inspected && options_.inspected->selfIntersections == 0;
-    if (byNormals && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean)
+    if (byNormals && !part_ && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean)
         repair(*distance_, mesh, options_, progress_, signs_);
     trim();
     times_.assemble += part.lap();

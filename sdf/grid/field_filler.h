@@ -64,6 +64,8 @@ class FieldFiller {
 
     /// Returns on which sides the outermost voxels of the part lie.
     const FaceSides& faces() const { return faces_; }
+    /// Returns how the normals of the part compare with winding numbers, if it checks them.
+    const ComparedSigns& compared() const { return compared_; }
     /// Returns borderOf() the part.
     const openvdb::FloatTree::Ptr& border() const { return border_; }
 
@@ -91,6 +93,7 @@ class FieldFiller {
     MeshExtent extent_;
     FieldSigns signs_;
     FaceSides faces_{};
+    ComparedSigns compared_;
     openvdb::FloatTree::Ptr border_;
     std::atomic<std::size_t> filledBlocks_ = 0;
     openvdb::FloatGrid::Ptr distance_;

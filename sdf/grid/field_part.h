@@ -7,12 +7,37 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 
 #include <bilayer/sdf/mesh.h>
+#include <bilayer/sdf/options.h>
 #include "sdf/base/openvdb.h"
 #include "sdf/leaf/blocks.h"
+#include "sdf/sign/column_sums.h"
+#include "sdf/sign/sign_choice.h"
+#include "sdf/sign/sign_repair.h"
 
 namespace bilayer::detail {
+
+/// What is done where the normals of a closed mesh contradict its winding number.
+enum class NormalsCheck { none, count, correct };
+
+/// How the parts of a field find their signs. This is decided once, for all of them.
+struct PartSigns {
+    Sign method = Sign::normals;      ///< or `winding`, of a closed mesh
+    std::string reason = asAskedFor;  ///< as chooseSign() states it
+    std::string name{};               ///< of the method in the metadata; empty: that of `method`
+    NormalsCheck check = NormalsCheck::none;
+    /// The sums of all crossings below the part, of the columns of all blocks that it fills. Needed by `winding` and
+    /// by a check.
+    const ColumnSums* below = nullptr;
+};
+
+/// How many signs of a part's leaves contradict winding numbers.
+struct ComparedSigns {
+    std::size_t leaves = 0;      ///< but for those without a voxel in the band and all on one side
+    SignRepair everyFifth, all;  ///< in one column of five; in all columns
+};
 
 /// What a part needs of the whole field. The boxes end at borders of bricks, or at `unbounded` where no part follows.
 struct FieldPart {
@@ -22,6 +47,7 @@ struct FieldPart {
     BlockBox own;            ///< the part's blocks
     /// The numbers in the whole mesh of the part's triangles, which ascend.
     std::span<const std::uint32_t> triangles;
+    PartSigns signs{};
 
     /// Returns the blocks to fill: the part's own, and the next layer above it along each axis. Pairs of voxels across
     /// a border are compared by the lower one of two parts, so every pair is compared once.

@@ -30,10 +30,6 @@ std::uint64_t bitsOf(float coordinate) {
     return std::bit_cast<std::uint32_t>(coordinate + 0.0f);
 }
 
-std::uint64_t hashOf(const glm::vec3& p) {
-    return mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
-}
-
 // Sorts half-edges into buckets by the lower vertex, then sorts each bucket. This takes linear time, unlike a sort of
 // all half-edges. Threads fill a bucket in any order, and the sort makes the result deterministic.
 LargeArray<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) {
@@ -125,9 +121,13 @@ ConcurrentDisjointSets connectedVertices(const Mesh& mesh) {
     return sets;
 }
 
+std::uint64_t hashVertex(const glm::vec3& p) {
+    return mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
+}
+
 std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress) {
     auto hashes = vectorOf<std::uint64_t>(mesh.points.size(), progress);
-    forAllPolled(hashes.size(), grain, progress, [&](std::size_t i) { hashes[i] = hashOf(mesh.points[i]); });
+    forAllPolled(hashes.size(), grain, progress, [&](std::size_t i) { hashes[i] = hashVertex(mesh.points[i]); });
     return hashes;
 }
 

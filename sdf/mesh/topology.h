@@ -89,6 +89,9 @@ struct Topology {
     Topology(const Mesh& mesh, const LargeArray<unsigned>& first, Progress* progress);
 };
 
+/// Returns a 64-bit hash of a vertex. 0 and -0 are equal.
+std::uint64_t hashVertex(const glm::vec3& point);
+
 /// Returns a 64-bit hash for each vertex. Equal coordinates have equal hashes.
 std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress = nullptr);
 

@@ -10,44 +10,20 @@
 #include <cmath>
 #include <glm/vec2.hpp>
 
-#include "sdf/base/line_side.h"
 #include "sdf/base/progress.h"
+#include "sdf/sign/triangle_columns.h"
 
 namespace bilayer::detail {
 namespace {
 
 constexpr int side = blockSide, columns = int(columnsPerLeaf);
 
-/// The integers in an interval.
-struct Interval {
-    std::int64_t first, last;
-
-    Interval(std::int64_t from, std::int64_t to) : first(from), last(to) {}
-    Interval(double a, double b, double c) {
-        const double low = std::min(std::min(a, b), c), high = std::max(std::max(a, b), c);
-        first = std::int64_t(low);
-        first += double(first) < low;
-        last = std::int64_t(high);
-        last -= double(last) > high;
-    }
-    Interval within(const Interval& other) const { return {std::max(first, other.first), std::min(last, other.last)}; }
-    bool empty() const { return first > last; }
-};
-
-// Returns the side of a line on which a column lies; 0 only if the line is degenerate.
-int sideOf(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& column) {
-    if (const int s = lineSide(a, b, column)) return s;
-    // Perturbation: infinitesimally toward +x, and by a higher order toward +y.
-    if (a.y != b.y) return b.y < a.y ? 1 : -1;
-    return b.x > a.x ? 1 : a.x > b.x ? -1 : 0;
-}
-
 // Returns whether a column is one of every five. Of any column and its four neighbours, exactly one is.
 bool isFifth(std::int64_t x, std::int64_t y) {
     return (x + 2 * y) % 5 == 0;
 }
 
-bool anyFifth(const Interval& x, const Interval& y) {
+bool anyFifth(const IntegerInterval& x, const IntegerInterval& y) {
     for (std::int64_t u = x.first; u <= std::min(x.last, x.first + 4); ++u)
         if (((2 * u - y.first) % 5 + 5) % 5 <= y.last - y.first) return true;
     return false;
@@ -60,23 +36,15 @@ std::uint64_t fifthsOf(std::int64_t x0, std::int64_t y0) {
     return mask;
 }
 
-std::int32_t firstAbove(const glm::dvec3 (&p)[3], const glm::dvec2& at) {
-    double weights = 0, sum = 0;
-    for (int k = 0; k < 3; ++k) {
-        const glm::dvec2 q = glm::dvec2(p[(k + 1) % 3]) - at, r = glm::dvec2(p[(k + 2) % 3]) - at;
-        const double weight = std::abs(q.x * r.y - q.y * r.x);
-        weights += weight;
-        sum += weight * p[k].z;
-    }
-    const double low = std::min({p[0].z, p[1].z, p[2].z}), high = std::max({p[0].z, p[1].z, p[2].z});
-    return std::int32_t(std::floor(weights > 0 ? std::clamp(sum / weights, low, high) : low)) + 1;
-}
-
 }  // namespace
 
 ColumnCrossings::ColumnCrossings(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, double voxelSize,
-                                 bool everyFifthColumn, Progress* progress)
-    : mesh_(mesh), everyFifthColumn_(everyFifthColumn), voxelsPerUnit_(1 / voxelSize), progress_(progress) {
+                                 bool everyFifthColumn, Progress* progress, std::int32_t lowest)
+    : mesh_(mesh),
+      everyFifthColumn_(everyFifthColumn),
+      voxelsPerUnit_(1 / voxelSize),
+      progress_(progress),
+      lowest_(lowest) {
     gatherLeaves(leaves);
     gatherTriangles();
 }
@@ -119,12 +87,12 @@ void ColumnCrossings::addTriangle(std::uint32_t triangle, std::vector<TriangleIn
     const glm::uvec3& t = mesh_.triangles[triangle];
     const glm::vec3 &a = mesh_.points[t.x], &b = mesh_.points[t.y], &c = mesh_.points[t.z];
     const auto range = [&](int axis) {
-        return Interval(double(a[axis]) * voxelsPerUnit_, double(b[axis]) * voxelsPerUnit_,
-                        double(c[axis]) * voxelsPerUnit_);
+        return IntegerInterval(double(a[axis]) * voxelsPerUnit_, double(b[axis]) * voxelsPerUnit_,
+                               double(c[axis]) * voxelsPerUnit_);
     };
-    const Interval x = range(0);
+    const IntegerInterval x = range(0);
     if (x.empty()) return;
-    const Interval y = range(1);
+    const IntegerInterval y = range(1);
     if (y.empty() || (everyFifthColumn_ && !anyFifth(x, y))) return;
     for (std::int64_t u = x.first >> 3; u <= x.last >> 3; ++u) {
         auto tile = std::lower_bound(tiles_.begin(), tiles_.end(), tileAt(u, y.first >> 3));
@@ -164,20 +132,19 @@ void ColumnCrossings::sortByLeaf(std::span<const LeafInTile> leaves, OfTile& cro
 
 void ColumnCrossings::addCrossings(std::uint32_t triangle, const openvdb::Coord& origin, std::uint64_t asked,
                                    std::vector<ColumnCrossing>& crossings) const {
-    const glm::dvec3 p[3] = {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)};
-    const glm::dvec2 a(p[0]), b(p[1]), c(p[2]);
+    const TriangleColumns crossed(corner(triangle, 0), corner(triangle, 1), corner(triangle, 2));
     const std::int64_t x0 = origin.x(), y0 = origin.y();
-    const Interval xs = Interval(a.x, b.x, c.x).within({x0, x0 + side - 1});
-    const Interval ys = Interval(a.y, b.y, c.y).within({y0, y0 + side - 1});
+    const IntegerInterval xs = crossed.xs().within({x0, x0 + side - 1});
+    const IntegerInterval ys = crossed.ys().within({y0, y0 + side - 1});
     for (std::int64_t x = xs.first; x <= xs.last; ++x)
         for (std::int64_t y = ys.first; y <= ys.last; ++y) {
             const std::int64_t column = (x - x0) * side + (y - y0);
             if ((asked >> column & 1) == 0) continue;
             const glm::dvec2 at(x, y);
-            const int s = sideOf(a, b, at);
-            if (s == 0 || sideOf(b, c, at) != s || sideOf(c, a, at) != s) continue;
-            // Seen from above, downward-facing triangles are clockwise.
-            crossings.push_back({firstAbove(p, at), std::uint8_t(column), std::int8_t(-s)});
+            const int sign = crossed.crossing(at);
+            if (sign == 0) continue;
+            const std::int32_t above = crossed.firstAbove(at);
+            if (above >= lowest_) crossings.push_back({above, std::uint8_t(column), std::int8_t(sign)});
         }
 }
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where columns of voxels along z cross the triangles of a mesh, sorted by the leaves of a narrow band. Sums of
 // crossings from below are winding numbers, exactly, if the mesh is closed.
-//
-// Columns are exact lines in the lattice. A column that hits an edge counts as displaced by an infinitesimal amount,
-// the same for all triangles.
 // Tested by tests/sdf/sign_repair.cpp through build().
 #pragma once
 
@@ -11,11 +8,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/sign/column_sums.h"
 #include "sdf/sign/octree_cells.h"
 
 namespace bilayer::detail {
@@ -44,8 +43,9 @@ class ColumnCrossings {
     /// Keeps a reference to the mesh.
     /// @param everyFifthColumn  whether to find the crossings of one column in five only, evenly distributed
     /// @param progress          polled, unless null
+    /// @param lowest            crossings below this voxel are left out
     ColumnCrossings(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, double voxelSize, bool everyFifthColumn,
-                    Progress* progress);
+                    Progress* progress, std::int32_t lowest = std::numeric_limits<std::int32_t>::min());
 
     std::size_t tiles() const { return tiles_.size(); }
 
@@ -95,6 +95,7 @@ class ColumnCrossings {
     const bool everyFifthColumn_;
     const double voxelsPerUnit_;
     Progress* progress_;
+    std::int32_t lowest_;
     std::vector<LeafInTile> leaves_;            ///< by tile, then from bottom to top
     std::vector<Tile> tiles_;                   ///< those with leaves
     std::vector<std::size_t> leavesOfTile_;     ///< start of each tile's leaves
@@ -105,6 +106,14 @@ class ColumnCrossings {
 /// The winding numbers along the columns of a tile, from bottom to top.
 class ColumnNumbers {
   public:
+    ColumnNumbers() = default;
+    /// @param below  of columns that do not begin at zero
+    /// @param first  the tile's first column
+    ColumnNumbers(const ColumnSums& below, const openvdb::Coord& first) {
+        for (std::size_t column = 0; column < columnsPerLeaf; ++column)
+            winding_[column] = below.at(first.x() + int(column / blockSide), first.y() + int(column % blockSide));
+    }
+
     /// Enters the next leaf of the tile. Returns the columns that are crossed in it or below it, one bit each.
     std::uint64_t enter(const BandLeaf& leaf, std::span<const ColumnCrossing> crossings) {
         std::uint64_t crossed = 0;

@@ -82,6 +82,11 @@ std::string unionReason(const UnionSurface& united) {
                        united.cutTriangles);
 }
 
+std::string repairedReason(const std::string& reasonOfNormals, std::size_t voxels) {
+    return fmt::format("{}, but the surface intersects itself; {} voxels have the side of their winding number",
+                       reasonOfNormals, voxels);
+}
+
 bool balanced(const Mesh& mesh, Progress* progress) {
     const std::vector<std::uint64_t> vertices = hashVertices(mesh, progress);
     // Sums modulo 2^64 do not depend on the order.

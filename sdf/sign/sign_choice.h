@@ -2,6 +2,7 @@
 // Selects the sign method for a mesh, and states the reason.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 
@@ -42,6 +43,9 @@ inline constexpr const char* asAskedFor = "as asked for";
 
 /// Returns the reason for signs of a union. outwardMesh() recognizes from it that walls were removed.
 std::string unionReason(const UnionSurface& united);
+
+/// Returns the reason for signs by normals of which repairSigns() has corrected some.
+std::string repairedReason(const std::string& reasonOfNormals, std::size_t voxels);
 
 /// Selects the method for Sign::automatic. Checks balanced() first, which takes milliseconds; a balanced mesh gets
 /// `normals` unchanged. Otherwise orients the mesh and selects:

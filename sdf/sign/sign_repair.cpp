@@ -22,13 +22,16 @@ constexpr int side = int(Leaf::DIM);
 /// Voxels closer to the surface than this may have either sign [voxels].
 constexpr float onSurface = 1e-3f;
 
-/// Up to this many leaves, all columns are compared at once, in milliseconds.
-constexpr openvdb::Index32 fewLeaves = 1024;
-
 /// Compares the signs of a tile's leaves with the winding numbers along its columns, from bottom to top.
 class TileRepair {
   public:
-    TileRepair(float tolerance, float limit) : tolerance_(tolerance), limit_(limit) {}
+    TileRepair(float tolerance, float limit, bool correct) : tolerance_(tolerance), limit_(limit), correct_(correct) {}
+
+    /// Begins with winding numbers that are not zero, at the tile's first leaf.
+    void begin(const ColumnSums& below, const openvdb::Coord& first) {
+        if (!begun_) numbers_ = {below, first};
+        begun_ = true;
+    }
 
     /// Compares the next leaf, and corrects it.
     /// @param crossings  those between the last leaf's top and this one's
@@ -60,35 +63,48 @@ class TileRepair {
         if (std::signbit(value) == (winding > 0) || std::abs(value) <= tolerance_) return;
         if (!leaf.isValueOn(openvdb::Index(voxel))) return;
         const bool mayFlip = winding >= 0 && std::abs(value) < limit_;
-        if (mayFlip) value = -value;
+        if (mayFlip && correct_) value = -value;
         ++(mayFlip ? sum.repaired : sum.refused);
     }
 
-    const float tolerance_, limit_;
+    float tolerance_, limit_;
+    bool correct_;
+    bool begun_ = false;
     ColumnNumbers numbers_;
 };
 
-/// @param everyFifthColumn  whether to compare only one column in five
-SignRepair repairColumns(openvdb::FloatGrid& distance, const Mesh& mesh, float limit, bool everyFifthColumn,
-                         Progress* progress) {
-    const double voxelSize = distance.voxelSize()[0];
-    const ColumnCrossings columns(leavesOf(distance), mesh, voxelSize, everyFifthColumn, progress);
+SignRepair add(const SignRepair& a, const SignRepair& b) {
+    return {a.repaired + b.repaired, a.refused + b.refused};
+}
+
+/// @param begin  called as begin(tile, leaf) before each leaf
+template <class Begin>
+SignRepair repairColumns(const ColumnCrossings& columns, const TileRepair& fresh, Progress* progress,
+                         const Begin& begin) {
     return tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, columns.tiles()), SignRepair(),
         [&](const auto& range, SignRepair sum) {
             ColumnCrossings::OfTile crossings;
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 poll(progress);
-                TileRepair tile(onSurface * float(voxelSize), limit);
+                TileRepair tile = fresh;
                 columns.forEachLeaf(i, crossings, [&](Leaf& leaf, auto found, std::uint64_t asked) {
+                    begin(tile, leaf);
                     tile.repair(leaf, found, asked, sum);
                 });
             }
             return sum;
         },
-        [](const SignRepair& a, const SignRepair& b) {
-            return SignRepair{a.repaired + b.repaired, a.refused + b.refused};
-        });
+        add);
+}
+
+/// @param everyFifthColumn  whether to compare only one column in five
+SignRepair repairColumns(openvdb::FloatGrid& distance, const Mesh& mesh, float limit, bool everyFifthColumn,
+                         Progress* progress) {
+    const double voxelSize = distance.voxelSize()[0];
+    const ColumnCrossings columns(leavesOf(distance), mesh, voxelSize, everyFifthColumn, progress);
+    return repairColumns(columns, TileRepair(onSurface * float(voxelSize), limit, true), progress,
+                         [](const TileRepair&, const Leaf&) {});
 }
 
 }  // namespace
@@ -102,6 +118,14 @@ SignRepair repairSigns(openvdb::FloatGrid& distance, const Mesh& mesh, float lim
     }
     const SignRepair rest = repairColumns(distance, mesh, limit, false, progress);
     return {some.repaired + rest.repaired, rest.refused};
+}
+
+SignRepair compareSigns(const ComparedLeaves& compared, const Mesh& mesh, float limit, bool everyFifthColumn,
+                        bool correct, Progress* progress) {
+    const ColumnCrossings columns(compared.leaves, mesh, compared.voxelSize, everyFifthColumn, progress,
+                                  compared.lowest);
+    return repairColumns(columns, TileRepair(onSurface * float(compared.voxelSize), limit, correct), progress,
+                         [&](TileRepair& tile, const Leaf& leaf) { tile.begin(compared.below, leaf.origin()); });
 }
 
 }  // namespace bilayer::detail

@@ -4,9 +4,13 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include <bilayer/sdf/mesh.h>
 #include "sdf/base/openvdb.h"
+#include "sdf/sign/column_sums.h"
+#include "sdf/sign/octree_cells.h"
 
 namespace bilayer::detail {
 
@@ -35,5 +39,22 @@ struct SignRepair {
 /// @param limit     maximum distance of a corrected voxel from the surface [m]
 /// @param progress  polled for cancellation, unless null
 SignRepair repairSigns(openvdb::FloatGrid& distance, const Mesh& mesh, float limit, Progress* progress = nullptr);
+
+/// Up to this many leaves, repairSigns() compares all columns at once, in milliseconds.
+inline constexpr std::size_t fewLeaves = 1024;
+
+/// Leaves whose signs are compared without the rest of the field.
+struct ComparedLeaves {
+    std::vector<BandLeaf*> leaves;
+    double voxelSize;         ///< [m]
+    const ColumnSums& below;  ///< of all crossings below `lowest`
+    std::int32_t lowest;      ///< voxel
+};
+
+/// Compares leaves as repairSigns() does.
+/// @param mesh     those triangles of the mesh that cross the leaves' columns from `lowest` up to the leaves
+/// @param correct  whether to correct the signs; otherwise they are only counted
+SignRepair compareSigns(const ComparedLeaves& leaves, const Mesh& mesh, float limit, bool everyFifthColumn,
+                        bool correct, Progress* progress);
 
 }  // namespace bilayer::detail

@@ -93,6 +93,17 @@ void forEachLeaf(const std::vector<BandLeaf*>& leaves, const Mesh& closed, const
     });
 }
 
+void signOpen(BandLeaf& leaf, ColumnNumbers& numbers, const WindingQuery& query, const WindingNumber& closing,
+              const BandWidths& widths) {
+    OpenMeshSides::Numbers closed;
+    for (std::size_t column = 0; column < columnsPerLeaf; ++column)
+        numbers.climb(column,
+                      [&](int k, std::int32_t number) { closed[column * blockSide + std::size_t(k)] = number; });
+    signLeaf(leaf, OpenMeshSides(query, closing, leaf, closed).inside(), widths);
+}
+
+}  // namespace
+
 void signClosed(BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t crossed, const BandWidths& widths) {
     BlockMask inside{};
     for (std::size_t column = 0; column < columnsPerLeaf; ++column) {
@@ -105,17 +116,6 @@ void signClosed(BandLeaf& leaf, ColumnNumbers& numbers, std::uint64_t crossed, c
     }
     signLeaf(leaf, inside, widths);
 }
-
-void signOpen(BandLeaf& leaf, ColumnNumbers& numbers, const WindingQuery& query, const WindingNumber& closing,
-              const BandWidths& widths) {
-    OpenMeshSides::Numbers closed;
-    for (std::size_t column = 0; column < columnsPerLeaf; ++column)
-        numbers.climb(column,
-                      [&](int k, std::int32_t number) { closed[column * blockSide + std::size_t(k)] = number; });
-    signLeaf(leaf, OpenMeshSides(query, closing, leaf, closed).inside(), widths);
-}
-
-}  // namespace
 
 void signLeaves(const std::vector<BandLeaf*>& leaves, const Mesh& mesh, const WindingQuery& query,
                 const BandWidths& widths) {

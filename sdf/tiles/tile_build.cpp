@@ -21,6 +21,8 @@ namespace {
 constexpr double bytesOfProcess = 160e6;
 /// Memory per triangle: as read, as a mesh, in bins, and in the cells of bricks [bytes].
 constexpr double bytesPerTriangle = 240;
+/// Memory per column of voxels: the tile's own sum, the one below, and one of another tile [bytes].
+constexpr double bytesPerColumn = 12;
 /// Memory per block: a leaf, its place in the tree, its compressed form, and the bytes of the file [bytes].
 constexpr double bytesPerBlock = 5000;
 
@@ -39,23 +41,24 @@ Mesh meshOf(std::span<const TileTriangle> triangles, const glm::dvec3& origin) {
 }  // namespace
 
 BuiltTile buildTile(std::span<const TileTriangle> triangles, const MeshFacts& facts, const Tiling& tiling,
-                    std::size_t tile, const BuildOptions& options) {
+                    std::size_t tile, const BuildOptions& options, const PartSigns& signs) {
     if (triangles.empty()) return {};
     std::vector<std::uint32_t> numbers(triangles.size());
     std::transform(triangles.begin(), triangles.end(), numbers.begin(), [](const auto& t) { return t.number; });
     const Mesh mesh = meshOf(triangles, facts.origin);
-    const FieldPart part{facts.box, facts.hash, tiling.lattice(), tiling.own(tile), numbers};
+    const FieldPart part{facts.box, facts.hash, tiling.lattice(), tiling.own(tile), numbers, signs};
     FilledPart filled = buildPart(mesh, options, part);
-    if (filled.conflicts > 0)
+    if (filled.conflicts > 0 && signs.check != NormalsCheck::count)
         throw std::invalid_argument(fmt::format(
             "the normals contradict each other at {} places of one tile, and only the whole mesh can decide the sides: "
-            "build this field in one piece",
+            "take the sign auto or winding, or build this field in one piece",
             filled.conflicts));
-    if (filled.grids->distance->tree().leafCount() == 0) return {};
+    const SignCounts counts{filled.conflicts, filled.compared};
+    if (filled.grids->distance->tree().leafCount() == 0) return {nullptr, {}, nullptr, counts};
     const openvdb::FloatGrid::Ptr border = openvdb::FloatGrid::create(filled.border);
     border->setName(borderGrid);
     border->setTransform(filled.grids->distance->transform().copy());
-    return {std::move(filled.grids), filled.faces, border};
+    return {std::move(filled.grids), filled.faces, border, counts};
 }
 
 double tileBytes(std::uint64_t triangles, double area, const Tiling& tiling, std::size_t tile,
@@ -63,7 +66,8 @@ double tileBytes(std::uint64_t triangles, double area, const Tiling& tiling, std
     const TriangleLimits limits = tiling.limits(tile);
     const glm::dvec3 side = limits.upper - limits.lower;
     const double blocks = std::min(side.x * side.y * side.z / blockVoxels, blocksAround(area, double(tiling.reach())));
-    return bytesOfProcess + double(triangles) * bytesPerTriangle + blocks * bytesPerBlock * (options.triangles ? 2 : 1);
+    return bytesOfProcess + side.x * side.y * bytesPerColumn + double(triangles) * bytesPerTriangle +
+           blocks * bytesPerBlock * (options.triangles ? 2 : 1);
 }
 
 }  // namespace bilayer::detail

@@ -30,6 +30,12 @@ struct MeshFacts {
     std::uint64_t triangles = 0;
 };
 
+/// What a tile tells of its signs by normals, if it checks them.
+struct SignCounts {
+    std::size_t conflicts = 0;  ///< places where normals contradict each other
+    ComparedSigns compared{};
+};
+
 struct BuiltTile {
     /// Grids with the whole field's values in the tile's box; elsewhere with the exterior background. Blocks
     /// without a voxel in the band are leaves if the whole field needs them for its signs. Null if no leaf is in the
@@ -39,15 +45,17 @@ struct BuiltTile {
     /// The voxels above the tile's box that the cells of its last blocks need. All others are space. Null if `grids`
     /// is.
     openvdb::FloatGrid::Ptr border;
+    SignCounts counts{};
 };
 
 /// Builds a tile. Its bytes are those of the whole field.
 /// @param triangles  those that Tiling::forEachTileOf() gives the tile, in the order of the mesh
 /// @param options    valid and local
+/// @param signs      of all tiles, for Method::exact
 /// Throws as build() does. Throws std::invalid_argument if only the whole mesh can decide a sign: where the normals
-/// cancel out or contradict each other.
+/// cancel out, or contradict each other and are not counted.
 BuiltTile buildTile(std::span<const TileTriangle> triangles, const MeshFacts& mesh, const Tiling& tiling,
-                    std::size_t tile, const BuildOptions& options);
+                    std::size_t tile, const BuildOptions& options, const PartSigns& signs = {});
 
 /// Returns about how much memory a tile needs [bytes].
 /// @param area  of the tile's triangles within its limits [voxels^2]

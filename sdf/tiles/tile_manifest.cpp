@@ -56,6 +56,8 @@ TileManifest readTileManifest(const std::filesystem::path& folder) {
         std::ifstream stream(path, std::ios::binary);
         const Json json = Json::parse(stream);
         manifest.counts = triple(json.at("field").at("tiles"));
+        const Json& origin = json.at("mesh").at("origin");
+        manifest.origin = {origin.at(0).get<double>(), origin.at(1).get<double>(), origin.at(2).get<double>()};
         for (const Json& tile : json.at("tiles")) manifest.tiles.push_back(recordOf(tile, folder));
     } catch (const Json::exception& error) {
         throw std::runtime_error(fmt::format("{}: is no manifest ({})", path.string(), error.what()));

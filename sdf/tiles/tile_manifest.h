@@ -34,6 +34,7 @@ struct TileRecord {
 /// The tiles of a field, numbered with z fastest.
 struct TileManifest {
     glm::ivec3 counts{0};
+    glm::dvec3 origin{0};  ///< LevelSet::origin() [m]
     std::vector<TileRecord> tiles;
 
     std::size_t at(const glm::ivec3& tile) const {

@@ -43,8 +43,8 @@ void requireLocal(const BuildOptions& options) {
     if (options.method != Method::exact && options.method != Method::doubleLayer)
         refuse(fmt::format("method {}", nameOf(options.method)),
                "its distances depend on the whole mesh; take exact or double-layer");
-    if (options.method == Method::exact && options.sign != Sign::normals)
-        refuse(fmt::format("sign {}", nameOf(options.sign)), "it needs the whole mesh; take normals");
+    if (options.method == Method::exact && options.sign == Sign::flood)
+        refuse("sign flood", "a path from outside may pass through all tiles; take normals, winding or auto");
     if (options.unite) refuse("union", "walls inside other solids are found from the whole mesh");
 }
 

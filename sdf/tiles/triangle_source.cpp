@@ -22,6 +22,8 @@
 #include "sdf/io/polygons.h"
 #include "sdf/io/stl_records.h"
 #include "sdf/io/text_source.h"
+#include "sdf/mesh/topology.h"
+#include "sdf/sign/sign_choice.h"
 
 namespace bilayer::detail {
 namespace {
@@ -36,9 +38,11 @@ bool isCollapsed(const glm::vec3* corners) {
 
 class MeshTriangles : public TriangleSource {
   public:
-    explicit MeshTriangles(Mesh mesh) : mesh_(std::move(mesh)) {
-        facts_ = {bounds(mesh_), mesh_.origin, hash(mesh_), mesh_.triangles.size()};
+    MeshTriangles(Mesh mesh, std::uint64_t hash) : mesh_(std::move(mesh)) {
+        facts_ = {bounds(mesh_), mesh_.origin, hash, mesh_.triangles.size()};
     }
+
+    bool isBalanced() const override { return balanced(mesh_); }
 
     void forEach(const Visit& visit) const override {
         std::vector<TileTriangle> batch;
@@ -73,6 +77,19 @@ class FileTriangles : public TriangleSource {
             file_.release();
             visit(batch);
         }
+    }
+
+    // Sums modulo 2^64, as balanced(). The file is read once more.
+    bool isBalanced() const override {
+        std::uint64_t sum = 0;
+        forEach([&](std::span<const TileTriangle> batch) {
+            for (const TileTriangle& t : batch) {
+                const std::uint64_t a = hashVertex(t.corners[0]), b = hashVertex(t.corners[1]),
+                                    c = hashVertex(t.corners[2]);
+                sum += hashEdge(a, b) + hashEdge(b, c) + hashEdge(c, a);
+            }
+        });
+        return sum == 0;
     }
 
   protected:
@@ -180,7 +197,12 @@ class PlyTriangles : public FileTriangles {
 }  // namespace
 
 std::unique_ptr<TriangleSource> trianglesOf(Mesh mesh) {
-    return std::make_unique<MeshTriangles>(std::move(mesh));
+    const std::uint64_t known = hash(mesh);
+    return trianglesOf(std::move(mesh), known);
+}
+
+std::unique_ptr<TriangleSource> trianglesOf(Mesh flipped, std::uint64_t hash) {
+    return std::make_unique<MeshTriangles>(std::move(flipped), hash);
 }
 
 std::unique_ptr<TriangleSource> trianglesOfFile(const std::filesystem::path& path) {

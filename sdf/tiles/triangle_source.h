@@ -3,6 +3,7 @@
 // Tested by tests/sdf/triangle_source.cpp.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -24,6 +25,9 @@ class TriangleSource {
     /// readMesh() returns.
     virtual void forEach(const Visit& visit) const = 0;
 
+    /// Returns whether every edge is used equally often in both directions, as balanced() does.
+    virtual bool isBalanced() const = 0;
+
     const MeshFacts& facts() const { return facts_; }
 
   protected:
@@ -32,6 +36,8 @@ class TriangleSource {
 
 /// The triangles of a mesh in memory.
 std::unique_ptr<TriangleSource> trianglesOf(Mesh mesh);
+/// The same for a mesh whose triangles were flipped, with the hash that it had before.
+std::unique_ptr<TriangleSource> trianglesOf(Mesh flipped, std::uint64_t hash);
 
 /// The triangles of a binary STL file, or of a binary PLY file of triangles with coordinates that are floats. Of the
 /// file, only some pages are in memory. The hash of the mesh is not known. Returns null for another file.

@@ -37,7 +37,7 @@ inspect t.obj
 inspect t.obj --dt 0.01 --speed 1
 info t.vdb
 info body.vdb
-build t.obj -o tiles --resolution 32 --tiles 2x1x1 --sign normals
+build t.obj -o tiles --resolution 32 --tiles 2x1x1
 merge tiles -o merged.vdb
 export t.vdb -o t.nvdb
 seed t.obj -o liquid.vdb --voxel-size 0.1 --particles 1
@@ -151,7 +151,8 @@ def keys(build):
             rest = result.stdout.strip()
             while rest:
                 value, end = json.JSONDecoder().raw_decode(rest)
-                lines |= {f"{command}: {path}" for path in paths(value) if not path.startswith("signs.")}  # texts, counted
+                listed = [path for path in paths(value) if command == "build" or not path.startswith("signs.")]  # texts
+                lines |= {f"{command}: {path}" for path in listed}
                 rest = rest[end:].strip()
     return lines
 

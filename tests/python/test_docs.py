@@ -56,7 +56,9 @@ def test_everything_public_has_a_docstring_of_its_own():
 
 
 @pytest.mark.parametrize("name, text", list(texts()), ids=[name for name, _ in texts()])
-def test_docstrings(name, text):
+def test_docstrings(name, text, request, monkeypatch):
+    if "box_tiles" in text:
+        monkeypatch.chdir(request.getfixturevalue("folder_with_tiles"))
     test = doctest.DocTestParser().get_doctest(text, {}, name, None, 0)
     runner = doctest.DocTestRunner()
     report = []

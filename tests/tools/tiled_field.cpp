@@ -37,10 +37,11 @@ struct Tiles {
     Mesh mesh;
 };
 
-Tiles builtTiles(const std::string& name, const Mesh& mesh, const std::string& tiles, const Words& options) {
+Tiles builtTiles(const std::string& name, const Mesh& mesh, const std::string& tiles, const Words& options,
+                 const std::string& sign = "normals") {
     const fs::path file = scratch(name + ".ply"), folder = scratch(name), merged = scratch(name + ".vdb");
     writeMesh(file, mesh);
-    Words words{"build", file.string(), "-o", folder.string(), "--tiles", tiles, "--sign", "normals", "--json"};
+    Words words{"build", file.string(), "-o", folder.string(), "--tiles", tiles, "--sign", sign, "--json"};
     words.insert(words.end(), options.begin(), options.end());
     const Result built = run(words);
     INFO(built.err);
@@ -146,6 +147,25 @@ TEST_CASE("tiles without leaves have a side") {
     for (const glm::vec3& point : queryPoints(tiles, 20000, random)) {
         CAPTURE(point.x, point.y, point.z);
         REQUIRE(sameBytes(field.sample(point), whole.sample(point)));
+    }
+}
+
+TEST_CASE("tiles with signs by winding numbers have the samples of the merged field") {
+    Mesh bar = shapes::box({20, 1, 1});
+    for (glm::vec3& p : bar.points) p = {p.x - 0.01f * p.y, p.y + 0.01f * p.x, p.z};
+    const Mesh bars = shapes::join({bar, shapes::moved(shapes::box({1, 20, 1}), {0, 0.05f, 0.025f})}),
+               balls = shapes::join({shapes::sphere(1, 4), shapes::moved(shapes::sphere(0.8f, 4), {0.3f, 0.2f, 0.1f})});
+    const Tiles all[] = {builtTiles("tiled balls", balls, "4x4x4", {"--resolution", "160"}, "winding"),
+                         builtTiles("tiled auto", balls, "3x2x3", {"--resolution", "120"}, "auto"),
+                         builtTiles("tiled bars", bars, "2x2x1", {"--resolution", "40"}, "auto")};
+    Random random(seed());
+    for (const Tiles& tiles : all) {
+        const Field whole(tiles.merged);
+        const TiledField field(tiles.folder, unlimited);
+        for (const glm::vec3& point : queryPoints(tiles, 20000, random)) {
+            CAPTURE(tiles.folder.string(), point.x, point.y, point.z);
+            REQUIRE(sameBytes(field.sample(point), whole.sample(point)));
+        }
     }
 }
 

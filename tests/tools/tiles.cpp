@@ -208,8 +208,6 @@ TEST_CASE("tiles refuse what needs the whole field, by name") {
         CHECK(!fs::exists(folder));
     };
     const Words normals{"--sign", "normals"};
-    refused({}, "tiles have no sign auto");
-    refused({"--sign", "winding"}, "tiles have no sign winding");
     refused({"--sign", "flood"}, "tiles have no sign flood");
     refused({"--method", "pseudonormal", "--sign", "normals"}, "tiles have no method pseudonormal");
     refused(joined(normals, {"--union"}), "tiles have no union");

@@ -17,6 +17,25 @@ done
 "$bilayer" merge ranks4 -o ranks4.vdb >/dev/null
 "$bilayer" build "$mesh" -o whole.vdb --resolution 150 --sign normals >/dev/null
 diff <("$bilayer" info --json ranks4.vdb) <("$bilayer" info --json whole.vdb)
+# a clean mesh, and two boxes that overlap: normals contradict each other, and all ranks build again by winding numbers
+awk '/^v/ { v[n++] = $2 " " $3 " " $4; print } /^f/ { f[m++] = $2 " " $3 " " $4 " " $5; print }
+  END { for (i = 0; i < n; ++i) { split(v[i], p, " "); print "v", p[1] + 0.43, p[2] + 0.37, p[3] + 0.51 }
+        for (i = 0; i < m; ++i) { split(f[i], c, " "); print "f", c[1] + n, c[2] + n, c[3] + n, c[4] + n } }' "$mesh" >two.obj
+cp "$mesh" clean.obj
+for name in clean two; do
+  for sign in auto winding; do
+    "$bilayer" build $name.obj -o whole.vdb --resolution 150 --sign $sign >/dev/null
+    for count in 1 2 4; do
+      folder=$name$sign$count
+      mpirun --oversubscribe -n "$count" "$ranks" build $name.obj -o "$folder" --resolution 150 --tiles 2x2x2 --sign $sign \
+        --json >"$folder.json"
+      require_same "${name}${sign}1" "$folder"
+    done
+    "$bilayer" merge "$folder" -o merged.vdb >/dev/null
+    diff <("$bilayer" info --json merged.vdb) <("$bilayer" info --json whole.vdb)
+  done
+done
 # an error of one rank ends all of them
-if mpirun --oversubscribe -n 2 "$ranks" build "$mesh" -o refused --resolution 150 --tiles 3x2x2 2>refused.txt; then exit 1; fi
-grep -q "tiles have no sign auto" refused.txt
+if mpirun --oversubscribe -n 2 "$ranks" build "$mesh" -o refused --resolution 150 --tiles 3x2x2 --sign flood \
+  2>refused.txt; then exit 1; fi
+grep -q "tiles have no sign flood" refused.txt

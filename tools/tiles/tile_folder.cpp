@@ -7,6 +7,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <system_error>
+#include <vector>
 
 #include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
@@ -23,6 +24,18 @@ void TileFolder::create() const {
     std::error_code error;
     std::filesystem::create_directories(work(), error);
     if (error) throw std::runtime_error(fmt::format("{}: {}", work().string(), error.message()));
+}
+
+void TileFolder::removePlan() const {
+    std::filesystem::remove(plan());
+    std::vector<std::filesystem::path> sums;
+    for (const auto& entry : std::filesystem::directory_iterator(work()))
+        if (entry.path().extension() == ".sums") sums.push_back(entry.path());
+    for (const auto& path : sums) std::filesystem::remove(path);
+}
+
+void TileFolder::remove(const glm::ivec3& tile) const {
+    for (const auto& path : {record(tile), field(tile), cells(tile)}) std::filesystem::remove(path);
 }
 
 void TileFolder::clean() const {

@@ -27,11 +27,17 @@ class TileFolder {
     std::filesystem::path plan() const { return work() / "plan.json"; }
     /// The triangles of a tile.
     std::filesystem::path triangles(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".triangles"); }
+    /// The sums of a tile's columns.
+    std::filesystem::path sums(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".sums"); }
     /// What is known of a finished tile.
     std::filesystem::path record(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".json"); }
 
     /// Creates the folders that do not exist. Throws std::runtime_error that names the folder.
     void create() const;
+    /// Removes the plan, then the column sums.
+    void removePlan() const;
+    /// Removes the files of a tile and its record.
+    void remove(const glm::ivec3& tile) const;
     /// Removes the folder `work`.
     void clean() const;
 

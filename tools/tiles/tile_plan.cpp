@@ -49,12 +49,13 @@ Json loadOfRanks(const std::vector<Json>& records, const Json& plan, const Json&
         std::uint64_t peak = rank > 0 ? 0 : sorting.at("peakRssBytes").get<std::uint64_t>();
         double seconds = 0;
         for (const Json& record : records) {
-            const std::uint64_t triangles = record.at("readBytes");
+            const std::uint64_t triangles = record.at("readBytes"), sums = record.value("sumBytes", std::uint64_t(0));
             const bool own = record.at("rank") == rank;
             if (rank == 0 && !own) fromOthers += bytesOf(record);
             if (!own) continue;
             ++tiles;
-            read += triangles;
+            read += triangles + sums;
+            if (count > 1) fromOthers += sums;
             written += record.value("writtenBytes", std::uint64_t(0));
             if (rank > 0) fromOthers += triangles;
             seconds += record.at("seconds").get<double>();
@@ -93,8 +94,8 @@ Json identityOf(const BuildArguments& a, const glm::ivec3& counts, const std::st
             {"triangles", a.options.triangles}};
 }
 
-Json TilePlan::toJson(const Json& identity, const MeshFacts& facts, float voxelSize, const std::vector<TileLoad>& loads,
-                      const Json& sorting) {
+Json TilePlan::toJson(const Json& identity, const MeshFacts& facts, float voxelSize, const Json& signs,
+                      const std::vector<TileLoad>& loads, const Json& sorting) {
     Json tiles = Json::array();
     for (const TileLoad& load : loads) tiles.push_back({{"triangles", load.triangles}, {"area", load.area}});
     return {{"field", identity},
@@ -105,6 +106,7 @@ Json TilePlan::toJson(const Json& identity, const MeshFacts& facts, float voxelS
               {"upper", vector(facts.box.upper)},
               {"origin", vector(facts.origin)},
               {"hash", facts.hash}}},
+            {"signs", signs},
             {"sorting", sorting},
             {"loads", tiles}};
 }
@@ -117,12 +119,19 @@ TilePlan::TilePlan(Json plan) : plan_(std::move(plan)) {
                   mesh.at("hash").get<std::uint64_t>(),
                   mesh.at("triangles").get<std::uint64_t>()};
         voxelSize_ = plan_.at("voxelSize").get<float>();
+        signs_ = plannedSigns(plan_.at("signs"));
         for (const Json& load : plan_.at("loads"))
             loads_.push_back({load.at("triangles").get<std::uint64_t>(), load.at("area").get<double>()});
     } catch (const Json::exception& error) {
         throw std::runtime_error(
             fmt::format("the plan of the tiles is damaged: remove the folder work ({})", error.what()));
     }
+}
+
+Json TilePlan::with(const PlannedSigns& signs) const {
+    Json plan = plan_;
+    plan["signs"] = tools::toJson(signs);
+    return plan;
 }
 
 Json TilePlan::manifest(const std::vector<Json>& records, int ranks) const {
@@ -157,6 +166,7 @@ Json recordOf(const glm::ivec3& place, const BlockBox& box, std::uint64_t triang
             {"triangles", triangles},
             {"leaves", count([](const openvdb::FloatGrid& grid) { return grid.tree().leafCount(); })},
             {"activeVoxels", count([](const openvdb::FloatGrid& grid) { return grid.activeVoxelCount(); })},
+            {"signs", toJson(tile.counts)},
             {"band", tile.grids ? bandOf(*tile.grids->distance) : Json()},
             {"faces", faces}};
 }

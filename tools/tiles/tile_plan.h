@@ -11,6 +11,7 @@
 #include "sdf/tiles/tile_sort.h"
 #include "tools/build.h"
 #include "tools/output.h"
+#include "tools/tiles/sign_records.h"
 
 namespace bilayer::tools {
 
@@ -22,12 +23,16 @@ class TilePlan {
     /// Throws std::runtime_error if the plan has another form.
     explicit TilePlan(Json plan);
 
-    static Json toJson(const Json& identity, const detail::MeshFacts& facts, float voxelSize,
+    static Json toJson(const Json& identity, const detail::MeshFacts& facts, float voxelSize, const Json& signs,
                        const std::vector<detail::TileLoad>& loads, const Json& sorting);
 
     const detail::MeshFacts& facts() const { return facts_; }
     float voxelSize() const { return voxelSize_; }
     const std::vector<detail::TileLoad>& loads() const { return loads_; }
+    const PlannedSigns& signs() const { return signs_; }
+
+    /// Returns the plan with other signs.
+    Json with(const PlannedSigns& signs) const;
 
     /// Returns the manifest of the finished field.
     Json manifest(const std::vector<Json>& records, int ranks) const;
@@ -36,6 +41,7 @@ class TilePlan {
     Json plan_;
     detail::MeshFacts facts_;
     float voxelSize_ = 0;
+    PlannedSigns signs_;
     std::vector<detail::TileLoad> loads_;
 };
 

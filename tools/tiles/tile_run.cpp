@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 #include <regex>
 #include <stdexcept>
 #include <utility>
@@ -18,8 +19,10 @@
 #include "sdf/base/usable_memory.h"
 #include "sdf/grid/vdb_grids.h"
 #include "sdf/io/content_hash.h"
-#include "sdf/io/input_file.h"
+#include "sdf/tiles/tile_signs.h"
 #include "sdf/tiles/tile_sort.h"
+#include "tools/tiles/column_files.h"
+#include "tools/tiles/mesh_sort.h"
 #include "tools/tiles/tile_folder.h"
 #include "tools/tiles/tile_plan.h"
 
@@ -55,6 +58,24 @@ glm::ivec3 countsOf(const std::string& text) {
     return {std::stoi(match[1]), std::stoi(match[2]), std::stoi(match[3])};
 }
 
+void printTable(const Json& manifest, const std::string& folder) {
+    Table table(folder);
+    const Json& counts = manifest.at("field").at("tiles");
+    const Json& sum = manifest.at("sum");
+    table.row("tiles", fmt::format("{} x {} x {}, {} of them with leaves", counts[0].get<int>(), counts[1].get<int>(),
+                                   counts[2].get<int>(), sum.at("files").get<std::size_t>()));
+    table.row("leaves", grouped(sum.at("leaves")));
+    table.row("triangles", grouped(manifest.at("mesh").at("triangles")));
+    if (const Json& signs = manifest.at("signs"); !signs.is_null())
+        table.row("signs",
+                  fmt::format("{}: {}", signs.at("name").get<std::string>(), signs.at("reason").get<std::string>()));
+    table.row("sorted in", fmt::format("{:.3f} s, peak memory {}", manifest.at("sorting").at("seconds").get<double>(),
+                                       bytes(manifest.at("sorting").at("peakRssBytes"))));
+    table.row("built in", fmt::format("{:.3f} s of all tiles", sum.at("seconds").get<double>()));
+    table.row("peak memory", bytes(sum.at("peakRssBytes")));
+    table.print();
+}
+
 /// The work of one rank.
 class TileRun {
   public:
@@ -68,24 +89,28 @@ class TileRun {
     void run() {
         if (ranks_.isFirst()) prepare();
         ranks_.wait();
-        if (!std::filesystem::exists(folder_.manifest())) buildMissing();
+        while (!std::filesystem::exists(folder_.manifest())) {
+            ranks_.wait();  // else a fast first rank would write the manifest here
+            buildMissing();
+            ranks_.wait();
+        }
         if (!ranks_.isFirst()) return;
         const Json manifest = readJson(folder_.manifest());
-        a_.json ? print(manifest) : printTable(manifest);
+        a_.json ? print(manifest) : printTable(manifest, a_.output.string());
     }
 
   private:
     // Plans the field, or resumes the existing plan. Afterwards there is the manifest of a finished field, or a plan
     // and the records of exactly those tiles that are intact.
     void prepare() {
-        const Json identity = identityOf(a_, counts_, fileHash(a_.mesh));
+        identity_ = identityOf(a_, counts_, fileHash(a_.mesh));
         for (const auto& path : {folder_.manifest(), folder_.plan()})
-            if (std::filesystem::exists(path) && readJson(path).at("field") != identity)
+            if (std::filesystem::exists(path) && readJson(path).at("field") != identity_)
                 throw std::runtime_error(
                     fmt::format("{}: holds tiles of another mesh or with other options: choose another folder",
                                 a_.output.string()));
-        if (isFinished()) return;
-        if (!std::filesystem::exists(folder_.plan())) sort(identity);
+        if (std::filesystem::exists(folder_.manifest()) && isFinished()) return;
+        if (!std::filesystem::exists(folder_.plan())) sort().run(identity_, 0);
         const TilePlan plan(readJson(folder_.plan()));
         setSizes(a_, plan.voxelSize());
         Tiling tiling(plan.facts().box, a_.options, counts_);
@@ -97,15 +122,18 @@ class TileRun {
         stateMemory(plan, tiling);
     }
 
-    // Returns whether all tiles are intact. If not, the manifest becomes the records of those that are.
-    bool isFinished() const {
-        if (!std::filesystem::exists(folder_.manifest())) return false;
-        const Json records = readJson(folder_.manifest()).at("tiles");
+    MeshSort sort() { return {a_, counts_, budget_, folder_}; }
+
+    // Returns whether all tiles are intact. If not, the manifest becomes a plan and the records of those that are.
+    bool isFinished() {
+        const Json manifest = readJson(folder_.manifest()), records = manifest.at("tiles");
         const auto intact = [&](const Json& record) { return isIntact(folder_, record); };
         if (std::all_of(records.begin(), records.end(), intact)) return true;
+        const PlannedSigns signs = plannedSigns(manifest.at("signs"));
         folder_.create();
         for (const Json& record : records)
             if (intact(record)) writeJson(folder_.record(placeOf(record)), record);
+        sort().run(identity_, signs.round, &signs);
         std::filesystem::remove(folder_.manifest());
         return false;
     }
@@ -113,36 +141,21 @@ class TileRun {
     void buildMissing() {
         const TilePlan plan(readJson(folder_.plan()));
         setSizes(a_, plan.voxelSize());
-        Tiling tiling(plan.facts().box, a_.options, counts_);
-        for (const std::size_t tile : ownTiles(plan, tiling)) build(plan, tiling, tile);
+        const Tiling tiling(plan.facts().box, a_.options, counts_);
+        const std::vector<std::size_t> own = ownTiles(plan, tiling);
+        ColumnFiles sums(folder_, plan, tiling);
+        if (plan.signs().needSums()) writeSums(sums, tiling, own);
+        for (const std::size_t tile : own) build(plan, tiling, tile, sums);
         ranks_.wait();
         if (ranks_.isFirst()) finish(plan, tiling);
     }
 
-    void sort(const Json& identity) {
-        const Stopwatch watch;
-        folder_.create();
-        const std::unique_ptr<TriangleSource> source = openMesh();
-        const MeshFacts& facts = source->facts();
-        const float side = facts.box.longestSide();
-        setSizes(a_, a_.resolutionGiven->count() ? side / a_.resolution : a_.options.voxelSize);
-        Tiling tiling(facts.box, a_.options, counts_);
-        const auto fileOf = [&](std::size_t tile) { return folder_.triangles(tiling.place(tile)); };
-        const std::vector<TileLoad> loads = sortTriangles(*source, tiling, a_.options.voxelSize, fileOf);
-        const Json sorting{{"seconds", watch.seconds()}, {"peakRssBytes", peakMemory()}, {"streamed", facts.hash == 0}};
-        writeJson(folder_.plan(), TilePlan::toJson(identity, facts, a_.options.voxelSize, loads, sorting));
-    }
-
-    // Reads the mesh whole if it fits, since its hash is then known.
-    std::unique_ptr<TriangleSource> openMesh() const {
-        requireInputFile(a_.mesh);
-        const double whole = double(std::filesystem::file_size(a_.mesh)) * bytesPerFileByte + bytesOfReader;
-        if (whole <= budget_) return trianglesOf(readMesh(a_.mesh));
-        if (auto source = trianglesOfFile(a_.mesh)) return source;
-        throw std::runtime_error(fmt::format(
-            "{}: reading it whole needs about {:.0f} MiB, and {:.0f} MiB are given; a binary STL file, or a binary PLY "
-            "file of triangles with float coordinates, is not read whole",
-            a_.mesh.string(), whole / mib, budget_ / mib));
+    // Sums of tiles that are built, and of those that are finished, whose sums may be missing too.
+    void writeSums(const ColumnFiles& sums, const Tiling& tiling, const std::vector<std::size_t>& own) {
+        for (const std::size_t tile : own) wrapped([&] { sums.write(tile); });
+        for (std::size_t tile = std::size_t(ranks_.rank); tile < tiling.size(); tile += std::size_t(ranks_.count))
+            if (std::filesystem::exists(folder_.record(tiling.place(tile)))) wrapped([&] { sums.write(tile); });
+        ranks_.wait();
     }
 
     double need(const TilePlan& plan, const Tiling& tiling, std::size_t tile) const {
@@ -176,17 +189,22 @@ class TileRun {
         return own;
     }
 
-    void build(const TilePlan& plan, const Tiling& tiling, std::size_t tile) {
+    void build(const TilePlan& plan, const Tiling& tiling, std::size_t tile, ColumnFiles& sums) {
         const Stopwatch watch;
         const glm::ivec3 place = tiling.place(tile);
         const std::uint64_t count = plan.loads()[tile].triangles;
         BuiltTile built;
-        {
+        const std::uint64_t sumsBefore = sums.readBytes();
+        if (count > 0) {
+            PartSigns signs = plan.signs().signs;
+            std::optional<ColumnSums> below;
+            if (plan.signs().needSums()) signs.below = &below.emplace(sums.below(tile));
             const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), count);
-            built = wrapped([&] { return buildTile(triangles, plan.facts(), tiling, tile, a_.options); });
+            wrapped([&] { built = buildTile(triangles, plan.facts(), tiling, tile, a_.options, signs); });
         }
         Json record = recordOf(place, tiling.own(tile).within(tiling.lattice()), count, built);
         record["readBytes"] = count * sizeof(TileTriangle);
+        record["sumBytes"] = sums.readBytes() - sumsBefore;
         if (built.grids) writeTile(std::move(built), place, plan.facts().origin, tiling.own(tile), record);
         built = {};
         ::malloc_trim(0);  // what one tile has used is free for the next
@@ -220,18 +238,25 @@ class TileRun {
     }
 
     template <class Work>
-    BuiltTile wrapped(const Work& work) const {
+    void wrapped(const Work& work) const {
         try {
-            return work();
+            work();
         } catch (const std::invalid_argument& error) {
             throw std::invalid_argument(fmt::format("{}: {}", a_.mesh.string(), error.what()));
         }
     }
 
+    // Completes the manifest, or plans the tiles anew if their counts show that the signs are not those of build().
     void finish(const TilePlan& plan, const Tiling& tiling) {
         std::vector<Json> records;
-        for (std::size_t tile = 0; tile < tiling.size(); ++tile)
+        std::vector<SignCounts> counts;
+        for (std::size_t tile = 0; tile < tiling.size(); ++tile) {
             records.push_back(readJson(folder_.record(tiling.place(tile))));
+            counts.push_back(signCounts(records.back().at("signs")));
+        }
+        if (plan.signs().signs.check == NormalsCheck::count)
+            if (const SignCounts sum = sumOf(counts); judge(sum) != SignVerdict::right)
+                return planAgain(plan, tiling, sum);
         if (std::all_of(records.begin(), records.end(), [](const Json& r) { return r.at("file").is_null(); }))
             throw std::invalid_argument(
                 "the half width is too small for this voxel size: no voxel lies within the band");
@@ -240,30 +265,27 @@ class TileRun {
         folder_.clean();
     }
 
-    void printTable(const Json& manifest) const {
-        Table table(a_.output.string());
-        const Json& sum = manifest.at("sum");
-        table.row("tiles", fmt::format("{} x {} x {}, {} of them with leaves", counts_.x, counts_.y, counts_.z,
-                                       sum.at("files").get<std::size_t>()));
-        table.row("leaves", grouped(sum.at("leaves")));
-        table.row("triangles", grouped(manifest.at("mesh").at("triangles")));
-        table.row("sorted in",
-                  fmt::format("{:.3f} s, peak memory {}", manifest.at("sorting").at("seconds").get<double>(),
-                              bytes(manifest.at("sorting").at("peakRssBytes"))));
-        table.row("built in", fmt::format("{:.3f} s of all tiles", sum.at("seconds").get<double>()));
-        table.row("peak memory", bytes(sum.at("peakRssBytes")));
-        table.print();
+    void planAgain(const TilePlan& plan, const Tiling& tiling, const SignCounts& sum) {
+        const bool conflict = judge(sum) == SignVerdict::conflict;
+        const int round = plan.signs().round;
+        if (conflict) {
+            sort().run(identity_, round + 1);
+        } else {
+            for (std::size_t tile = 0; tile < tiling.size(); ++tile) folder_.remove(tiling.place(tile));
+            writeJson(folder_.plan(), plan.with({corrected(plan.signs().signs, sum), round}));
+        }
+        if (a_.json) return;
+        const std::string reason = TilePlan(readJson(folder_.plan())).signs().signs.reason;
+        fmt::print("all tiles again: {}\n", reason);
+        std::fflush(stdout);
     }
-
-    /// Memory to read a mesh whole, per byte of its file, and the program without it [bytes]. The largest factor is
-    /// that of binary files.
-    static constexpr double bytesPerFileByte = 6, bytesOfReader = 120e6;
 
     BuildArguments a_;
     glm::ivec3 counts_;
     double budget_;  // [bytes]
     const Ranks& ranks_;
     TileFolder folder_;
+    Json identity_;  // of the first rank
 };
 
 }  // namespace
