@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Signs of a part of a closed mesh's field by winding numbers. The number of a voxel is the sum of all crossings of its
 // column below, an integer. What lies below the part is given, so that the part needs no other triangles.
-// Tested by tests/sdf/tile_signs.cpp.
+// Tested by tests/sdf/tile_signs.cpp through buildTile().
 #pragma once
 
 #include <bilayer/sdf/mesh.h>

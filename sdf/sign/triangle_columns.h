@@ -3,7 +3,7 @@
 //
 // Columns are exact lines in the lattice. A column that hits an edge counts as displaced by an infinitesimal amount,
 // the same for all triangles.
-// Tested by tests/sdf/sign_repair.cpp and tests/sdf/column_sums.cpp.
+// Tested by tests/sdf/column_sums.cpp.
 #pragma once
 
 #include <algorithm>

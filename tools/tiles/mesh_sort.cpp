@@ -31,13 +31,14 @@ constexpr double bytesPerOriented = 250;
 void MeshSort::run(const Json& identity, int round, const PlannedSigns* known) {
     const Stopwatch watch;
     const SignedSource mesh = open(round);  // may throw; the existing plan then stays
-    folder_.create();
-    folder_.removePlan();
     const MeshFacts& facts = mesh.source->facts();
     const float side = facts.box.longestSide();
     setSizes(a_, a_.resolutionGiven->count() ? side / a_.resolution : a_.options.voxelSize);
     Tiling tiling(facts.box, a_.options, counts_);
+    folder_.create();
+    // before the plan: a plan without some of its tiles can be resumed
     for (std::size_t tile = 0; round > 0 && !known && tile < tiling.size(); ++tile) folder_.remove(tiling.place(tile));
+    folder_.removePlan();
     const auto fileOf = [&](std::size_t tile) { return folder_.triangles(tiling.place(tile)); };
     const std::vector<TileLoad> loads = sortTriangles(*mesh.source, tiling, a_.options.voxelSize, fileOf);
     const Json sorting{{"seconds", watch.seconds()}, {"peakRssBytes", peakMemory()}, {"streamed", facts.hash == 0}};
