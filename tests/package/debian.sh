@@ -79,7 +79,7 @@ do_page() { # PAGE [OPTIONS...]
   echo "$@"
   python3 /source/tests/docs/run_page.py "${@:2}" --packages /packages /source /nowhere /scratch "docs/start/$1.md"
 }
-do_page install --from "As Debian packages" --until "Remove the packages"
+do_page install --from "As Debian packages" --until "Remove an installation from the sources"
 for page in field bullet liquid python contacts; do do_page $page; done
 do_page install --from "Remove the packages"
 
