@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What fields without a mesh answer, in one piece or in tiles: the closest point of the zero set, and the hit of a ray.
-// Tested by tests/collider/field.cpp through Field::closest() and by tests/tools/tiled_field.cpp.
+// Tested by tests/collider/field_rays.cpp through Field::raycast().
 #pragma once
 
 #include <cmath>

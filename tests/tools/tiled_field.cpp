@@ -299,7 +299,8 @@ TEST_CASE("a tile that is missing or damaged is an error that names its file") {
     const std::string text = contents(manifest);
     std::ofstream(manifest, std::ios::binary) << text.substr(0, text.size() / 2);
     CHECK_THAT(messageOf(sampleAll), Catch::Contains("manifest.json: is no manifest"));
-    std::ofstream(manifest, std::ios::binary) << "{\"field\": {\"tiles\": [1, 2, 3]}, \"tiles\": []}";
+    std::ofstream(manifest, std::ios::binary)
+        << R"({"field": {"tiles": [1, 2, 3]}, "mesh": {"origin": [0, 0, 0]}, "tiles": []})";
     CHECK_THAT(messageOf(sampleAll), Catch::Contains("manifest.json: has 0 tiles, but states 1 x 2 x 3"));
     fs::remove(manifest);
     CHECK_THAT(messageOf(sampleAll), Catch::Contains("manifest.json: no such file"));
