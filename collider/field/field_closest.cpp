@@ -8,7 +8,6 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>

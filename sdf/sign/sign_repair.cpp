@@ -73,10 +73,6 @@ class TileRepair {
     ColumnNumbers numbers_;
 };
 
-SignRepair add(const SignRepair& a, const SignRepair& b) {
-    return {a.repaired + b.repaired, a.refused + b.refused};
-}
-
 /// @param begin  called as begin(tile, leaf) before each leaf
 template <class Begin>
 SignRepair repairColumns(const ColumnCrossings& columns, const TileRepair& fresh, Progress* progress,
@@ -95,7 +91,7 @@ SignRepair repairColumns(const ColumnCrossings& columns, const TileRepair& fresh
             }
             return sum;
         },
-        add);
+        [](SignRepair a, const SignRepair& b) { return a += b; });
 }
 
 /// @param everyFifthColumn  whether to compare only one column in five

@@ -20,6 +20,12 @@ class Progress;
 struct SignRepair {
     std::size_t repaired = 0;  ///< active voxels whose sign was corrected
     std::size_t refused = 0;   ///< active voxels that keep a wrong sign
+
+    SignRepair& operator+=(const SignRepair& more) {
+        repaired += more.repaired;
+        refused += more.refused;
+        return *this;
+    }
 };
 
 /// Gives active voxels the sign of the mesh's winding number: negative where it is positive. Applies to the field of a

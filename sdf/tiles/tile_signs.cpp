@@ -102,15 +102,11 @@ SignVerdict judge(const SignCounts& sum) {
 
 SignCounts sumOf(std::span<const SignCounts> counts) {
     SignCounts sum;
-    const auto add = [](SignRepair& to, const SignRepair& more) {
-        to.repaired += more.repaired;
-        to.refused += more.refused;
-    };
     for (const SignCounts& one : counts) {
         sum.conflicts += one.conflicts;
         sum.compared.leaves += one.compared.leaves;
-        add(sum.compared.everyFifth, one.compared.everyFifth);
-        add(sum.compared.all, one.compared.all);
+        sum.compared.everyFifth += one.compared.everyFifth;
+        sum.compared.all += one.compared.all;
     }
     return sum;
 }
