@@ -28,6 +28,6 @@ function(bilayer_embed target file)
   string(HEX "${text}" text)
   string(REGEX REPLACE "(..)" "'\\\\x\\1'," text "${text}")
   file(CONFIGURE OUTPUT ${output} @ONLY
-    CONTENT "namespace bilayer::detail {\nnamespace {\nconstexpr char text[] = {@text@0};\n}\nextern const char* const @symbol@;\nconst char* const @symbol@ = text;\n}\n")
+    CONTENT "namespace bilayer::detail {\nnamespace {\nconstexpr char @symbol@_text[] = {@text@0};\n}\nextern const char* const @symbol@;\nconst char* const @symbol@ = @symbol@_text;\n}\n")
   target_sources(${target} PRIVATE ${output})
 endfunction()

@@ -21,9 +21,26 @@ function(bilayer_flags target)
   target_compile_options(${target} PRIVATE -ffp-contract=off -fno-math-errno -Wall -Wextra -Wpedantic $<$<BOOL:${BILAYER_WERROR}>:-Werror>
     # GCC 12 sees overlaps and overflows in std::string that are none (GCC bug 105329 and its like)
     $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>
-    # what ccache needs to keep files with precompiled headers
-    $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
+    # and takes the files of a group for headers, which should not use what is local to a file
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+  bilayer_group_sources(${target})
+endfunction()
+
+# BILAYER_GROUPS: sources are compiled in groups, since reading the headers of one takes most of its time. Alone stay those that
+# Highway compiles once for each instruction set, which include themselves, and those that ask a header for its implementation.
+function(bilayer_group_sources target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${BILAYER_GROUPS} UNITY_BUILD_BATCH_SIZE 12)
+  get_target_property(sources ${target} SOURCES)
+  foreach(source IN LISTS sources)
+    get_filename_component(path ${source} ABSOLUTE)
+    if(EXISTS ${path})
+      file(STRINGS ${path} alone REGEX "^#define (HWY_TARGET_INCLUDE|[A-Z]+_IMPLEMENTATION|CATCH_CONFIG_MAIN)")
+      if(alone)
+        set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+      endif()
+    endif()
+  endforeach()
 endfunction()
 
 # For targets that run for moments or wait for the libraries: compiled in half the time. Results are the same bytes, since
@@ -31,22 +48,6 @@ endfunction()
 function(bilayer_mild_optimisation target)
   # where it inlines less, GCC 12 sees null pointers in std::vector that are none
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-nonnull>)
-endfunction()
-
-# Those files of a target that include sdf/base/openvdb.h share OpenVDB's headers, compiled once: four seconds of each.
-function(bilayer_precompile_openvdb target)
-  get_target_property(sources ${target} SOURCES)
-  foreach(source IN LISTS sources)
-    get_filename_component(path ${source} ABSOLUTE)
-    set(includes "")
-    if(EXISTS ${path})
-      file(STRINGS ${path} includes REGEX "#include \"sdf/base/openvdb(_points)?\\.h\"")
-    endif()
-    if(NOT includes)
-      set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
-    endif()
-  endforeach()
-  target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/sdf/base/openvdb.h)
 endfunction()
 
 # bilayer_library(NAME FOLDER LINKS...): a library of all source files of a folder, unless no component of BILAYER_COMPONENTS needs it.

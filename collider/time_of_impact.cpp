@@ -31,17 +31,17 @@ constexpr double defaultTolerance = 0.05, minTolerance = 1e-5;
 /// time they have moved by their separation, and the length of their paths has no limit.
 constexpr int maxDistances = 10000;
 /// A body that rotates by more has no motion of one step [rad].
-constexpr float maxRotation = 1000;
+constexpr float maxMotionRotation = 1000;
 
 // The name of the motion begins errors: "motion a".
-void check(const Motion& motion, const std::string& name) {
+void requireFinite(const Motion& motion, const std::string& name) {
     if (!isFinite(motion.displacement) || !isFinite(motion.rotation))
         throw std::invalid_argument(fmt::format("{} must be finite, not {}, {}, {} and {}, {}, {} rad", name,
                                                 motion.displacement.x, motion.displacement.y, motion.displacement.z,
                                                 motion.rotation.x, motion.rotation.y, motion.rotation.z));
-    if (glm::length(glm::dvec3(motion.rotation)) > maxRotation)
+    if (glm::length(glm::dvec3(motion.rotation)) > maxMotionRotation)
         throw std::invalid_argument(fmt::format("{} rotates by {:g} rad; at most {:g} rad are allowed", name,
-                                                glm::length(motion.rotation), maxRotation));
+                                                glm::length(motion.rotation), maxMotionRotation));
 }
 
 /// What the search must know of a body.
@@ -88,7 +88,7 @@ struct MovingBody {
 
     MovingBody(const PlacedShape& placed, std::string name)
         : body(placed), motion(std::move(name)), sweep(placed.pose, placed.motion) {
-        check(placed.motion, motion);
+        requireFinite(placed.motion, motion);
     }
     PlacedShape at(double fraction) const { return {body.shape, sweep.at(fraction), body.scale}; }
     SweptShape swept() const { return {body.shape, sweep, {}, body.scale}; }

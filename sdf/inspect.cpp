@@ -41,8 +41,7 @@ constexpr std::size_t sampling = 32;
 /// Relative volume that exceeds rounding, in units of the volume of a cube with the same area (approximately).
 constexpr double clearVolume = 1e-6;
 
-/// Minimum work per task: triangles, or uses of edges or vertices.
-constexpr std::size_t grain = 4096;
+constexpr std::size_t edgesPerSum = 4096;
 
 /// Phases that count for the progress: topology, hierarchy, components, intersections, orientation.
 constexpr std::size_t phases = 5;
@@ -52,16 +51,11 @@ struct Component {
     bool closed = true;
 };
 
-template <class Body>
-void forAll(std::size_t count, Body body) {
-    forAllPolled(count, grain, nullptr, body);
-}
-
 // Calls visit(uses, sum) for all edges and returns the combined sum.
 template <class Sum, class Visit>
 Sum overEdges(const Topology& topology, Visit visit) {
     return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, topology.edges.size(), grain), Sum{},
+        tbb::blocked_range<std::size_t>(0, topology.edges.size(), edgesPerSum), Sum{},
         [&](const auto& range, Sum sum) {
             topology.forEdges(range.begin(), range.end(), [&](std::span<const EdgeUse> uses) { visit(uses, sum); });
             return sum;
@@ -145,7 +139,7 @@ std::size_t countDuplicates(const Topology& topology) {
 std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
     ConcurrentDisjointSets sets = connectedVertices(mesh);
     std::vector<unsigned> number(mesh.points.size(), noPart), of(mesh.triangles.size());
-    forAll(of.size(), [&](std::size_t i) { of[i] = sets.root(mesh.triangles[i].x); });
+    forAllPolled(of.size(), nullptr, [&](std::size_t i) { of[i] = sets.root(mesh.triangles[i].x); });
     count = 0;
     for (unsigned& component : of) {
         unsigned& n = number[component];
@@ -161,7 +155,7 @@ struct Measures {
 
     Measures(const Mesh& mesh, const Bounds& box) : areas(mesh.triangles.size()), volumes(mesh.triangles.size()) {
         const glm::dvec3 origin(box.centre());
-        forAll(areas.size(), [&](std::size_t i) {
+        forAllPolled(areas.size(), nullptr, [&](std::size_t i) {
             const glm::uvec3& t = mesh.triangles[i];
             const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
             const glm::dvec3 area = 0.5 * glm::cross(b - a, c - a);
@@ -206,8 +200,9 @@ float finiteOrZero(float thickness) {
 float thicknessAt(double area, const std::vector<float>& thickness, const Measures& measures) {
     // Sorted by thickness, then by index: the bit patterns of positive floats have the same order as their values.
     LargeArray<std::uint64_t> order(thickness.size());
-    forAll(order.size(),
-           [&](std::size_t i) { order[i] = std::uint64_t(std::bit_cast<std::uint32_t>(thickness[i])) << 32 | i; });
+    forAllPolled(order.size(), nullptr, [&](std::size_t i) {
+        order[i] = std::uint64_t(std::bit_cast<std::uint32_t>(thickness[i])) << 32 | i;
+    });
     double below = 0;
     // The search usually ends within the first few of many triangles.
     std::size_t sorted = 0;

@@ -26,7 +26,7 @@ constexpr double maxOrigin = double(std::uint64_t(1) << 40);
 /// Maximum band width [voxels]: a wider band is treated as file damage.
 constexpr float maxBandWidthVoxels = 1 << 23;
 /// Tolerance of an error bound, which was rounded when it was multiplied by the voxel size.
-constexpr float rounding = 1e-5f;
+constexpr float widthRounding = 1e-5f;
 /// The empty name is for fields from other programs.
 constexpr std::string_view methods[] = {"", nameOf(Method::exact), nameOf(Method::doubleLayer),
                                         nameOf(Method::pseudonormal), nameOf(Method::prism)};
@@ -44,15 +44,15 @@ Value meta(const openvdb::GridBase& grid, const char* name, const Value& fallbac
     return typed->value();
 }
 
-void require(bool holds, const openvdb::GridBase& grid, const char* entry, const auto& value, const char* range) {
+void requireEntry(bool holds, const openvdb::GridBase& grid, const char* entry, const auto& value, const char* range) {
     if (!holds)
         throw std::invalid_argument(
             fmt::format("grid {}: {} is {}, and must be {}", quotedWord(grid.getName()), entry, value, range));
 }
 
 void requireWidth(const openvdb::GridBase& grid, const char* entry, float width) {
-    require(width > 0 && std::isnormal(width) && double(width) <= double(maxBandWidthVoxels) * grid.voxelSize()[0],
-            grid, entry, width, "above 0 and at most 2^23 voxels");
+    requireEntry(width > 0 && std::isnormal(width) && double(width) <= double(maxBandWidthVoxels) * grid.voxelSize()[0],
+                 grid, entry, width, "above 0 and at most 2^23 voxels");
 }
 
 std::string requireName(const openvdb::GridBase& grid, const char* entry, const auto& names) {
@@ -67,9 +67,9 @@ std::string requireName(const openvdb::GridBase& grid, const char* entry, const 
 void requireErrorBound(const openvdb::GridBase& grid, const std::string& method, float errorBound) {
     if (!grid[metadata::errorBound]) return;
     const bool hasBound = method == nameOf(Method::exact) || method == nameOf(Method::pseudonormal);
-    const float least = hasBound ? (1 - rounding) * exactError : 0, h = float(grid.voxelSize()[0]);
-    require(errorBound >= least * h && (std::isfinite(errorBound) || !hasBound), grid, metadata::errorBound, errorBound,
-            hasBound ? "finite and at least the error of its method" : "0 or above");
+    const float least = hasBound ? (1 - widthRounding) * exactError : 0, h = float(grid.voxelSize()[0]);
+    requireEntry(errorBound >= least * h && (std::isfinite(errorBound) || !hasBound), grid, metadata::errorBound,
+                 errorBound, hasBound ? "finite and at least the error of its method" : "0 or above");
 }
 
 // Methods with signs of their own have no others.
@@ -90,7 +90,7 @@ void requireLevelSet(const Grids& grids) {
     if (!grid.hasUniformVoxels() || !grid.transform().isLinear())
         throw std::invalid_argument(fmt::format("grid {} has voxels that are not cubes", quotedWord(grid.getName())));
     const double h = grid.voxelSize()[0];
-    require(h >= minStoredVoxel && h <= maxStoredVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
+    requireEntry(h >= minStoredVoxel && h <= maxStoredVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
     requireWidth(grid, "the background", grid.background());
     if (grid.activeVoxelCount() == 0)
         throw std::invalid_argument(fmt::format("grid {} is empty", quotedWord(grid.getName())));
@@ -110,7 +110,7 @@ void requireLevelSet(const Grids& grids) {
                             "size. Shift the transform to these, or bilayer.LevelSet.from_numpy() takes its values "
                             "with a field_origin",
                             quotedWord(grid.getName()), origin[axis], "xyz"[axis]));
-        require(std::abs(origin[axis]) <= maxOrigin, grid, "the shift", origin[axis], "at most 2^40 voxels");
+        requireEntry(std::abs(origin[axis]) <= maxOrigin, grid, "the shift", origin[axis], "at most 2^40 voxels");
     }
 }
 
@@ -131,7 +131,7 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     signReason_ = meta<std::string>(grid, metadata::signReason, "");
     const auto count = [&](const char* name) {
         const auto value = meta<std::int64_t>(grid, name, 0);
-        require(value >= 0, grid, name, value, "0 or above");
+        requireEntry(value >= 0, grid, name, value, "0 or above");
         return std::uint64_t(value);
     };
     signConflicts_ = count(metadata::signConflicts);
@@ -140,7 +140,7 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     const auto origin = meta<openvdb::Vec3d>(grid, metadata::origin, openvdb::Vec3d(0));
     origin_ = {origin.x(), origin.y(), origin.z()};
     for (int axis = 0; axis < 3; ++axis)
-        require(std::isfinite(origin_[axis]), grid, metadata::origin, origin_[axis], "finite");
+        requireEntry(std::isfinite(origin_[axis]), grid, metadata::origin, origin_[axis], "finite");
 }
 
 float LevelSet::voxelSize() const {

@@ -31,19 +31,20 @@ using namespace detail;
 namespace {
 
 /// Vertices or triangles per task.
-constexpr std::size_t grain = 1 << 14;
+constexpr std::size_t itemsPerRun = 1 << 14;
 
 // Calls body(run, begin, end) for runs of the indices below n, in parallel.
 template <class Body>
 void forEachRun(std::size_t n, Body body) {
-    inOrder((n + grain - 1) / grain, [&](std::size_t run) { body(run, run * grain, std::min(n, (run + 1) * grain)); });
+    inOrder((n + itemsPerRun - 1) / itemsPerRun,
+            [&](std::size_t run) { body(run, run * itemsPerRun, std::min(n, (run + 1) * itemsPerRun)); });
 }
 
 // Keeps the items for which keeps(index) returns true, in order. Returns the new start of each run. keeps() is called
 // once per item and may modify that item.
 template <class Item, class Keeps>
 std::vector<std::size_t> keepWhere(std::vector<Item>& items, Keeps keeps) {
-    std::vector<std::size_t> places((items.size() + grain - 1) / grain + 1, 0);
+    std::vector<std::size_t> places((items.size() + itemsPerRun - 1) / itemsPerRun + 1, 0);
     forEachRun(items.size(), [&](std::size_t run, std::size_t begin, std::size_t end) {
         std::size_t kept = begin;
         for (std::size_t i = begin; i < end; ++i)
@@ -51,7 +52,7 @@ std::vector<std::size_t> keepWhere(std::vector<Item>& items, Keeps keeps) {
         places[run + 1] = kept - begin;
     });
     for (std::size_t run = 0; run + 1 < places.size(); ++run) {
-        const auto from = items.begin() + std::ptrdiff_t(run * grain);
+        const auto from = items.begin() + std::ptrdiff_t(run * itemsPerRun);
         const auto to = items.begin() + std::ptrdiff_t(places[run]);
         if (from != to) std::copy_n(from, places[run + 1], to);
         places[run + 1] += places[run];
@@ -111,7 +112,7 @@ void keepUsed(Mesh& mesh, const std::vector<std::uint8_t>& used) {
 template <class Holds>
 std::size_t firstWhere(std::size_t n, Holds holds) {
     return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, n, grain), n,
+        tbb::blocked_range<std::size_t>(0, n, itemsPerRun), n,
         [&](const auto& range, std::size_t found) {
             std::size_t i = range.begin();
             while (i < range.end() && !holds(i)) ++i;

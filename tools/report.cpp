@@ -207,7 +207,7 @@ void runInfo(const ReportArguments& a) {
     print(json);
 }
 
-Json toJson(const DeviceInfo& device) {
+Json deviceJson(const DeviceInfo& device) {
     return {{"platform", device.platform},
             {"name", device.name},
             {"version", device.version},
@@ -223,7 +223,7 @@ void runDevices(const ReportArguments& a) {
     const std::vector<DeviceInfo> found = devices();
     if (a.json) {
         Json list = Json::array();
-        for (const DeviceInfo& device : found) list.push_back(toJson(device));
+        for (const DeviceInfo& device : found) list.push_back(deviceJson(device));
         return print({{"devices", list}});
     }
     if (found.empty()) fmt::print("no OpenCL device\n");

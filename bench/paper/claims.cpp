@@ -4,7 +4,6 @@
 #include <openvdb/tools/MeshToVolume.h>
 
 #include <algorithm>
-#include <glm/gtc/constants.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
@@ -21,7 +20,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double pi = glm::pi<double>();
 constexpr unsigned seed = 2014;
 
 json toJson(const DistanceError& error) {
@@ -45,7 +43,7 @@ json measureTheorems(const Run&) {
             {"open", toJson(aroundBends(seed, bends, false))}};
 }
 
-constexpr double rounding = 1e-6;
+constexpr double claimRounding = 1e-6;
 
 std::string remarkTheorem1(const json& data) {
     double over = 0, flat = 0, convex = 0, convexDelta = 0;  // `flat` and `convex`: maximum "under"
@@ -59,7 +57,7 @@ std::string remarkTheorem1(const json& data) {
     std::string text;
     if (over < 2.0 / 3 && double(data["edges"]["over"]) < 0.5)
         text += " No distance is too large by more than the bound.";
-    if (flat < rounding) text += " Over faces and at reflex edges none is too small.";
+    if (flat < claimRounding) text += " Over faces and at reflex edges none is too small.";
     if (convex > 2.0 / 3)
         text += fmt::format(
             " At convex edges the theorem does not hold as it is printed: the proof's case 3 bounds `d_e - d` from "
@@ -102,10 +100,10 @@ std::string textTheorems(const json& data) {
            table({"bends with", "max of OF / ((L2 - L1) / 2)", "formula's F off the bisector by", "wrong signs met",
                   "the farthest of them [OF]"},
                  {sign("closed", "delta sin(2 theta) < L2 + L1 cos(2 theta)"), sign("open", "else")}) +
-           (std::max(double(data["closed"]["bound"]), double(data["open"]["bound"])) < 1 + rounding
+           (std::max(double(data["closed"]["bound"]), double(data["open"]["bound"])) < 1 + claimRounding
                 ? "\nThe inequality holds."
                 : "\nThe inequality does not hold.") +
-           (double(data["closed"]["farthest"]) < 1 + rounding && double(data["open"]["farthest"]) > 1
+           (double(data["closed"]["farthest"]) < 1 + claimRounding && double(data["open"]["farthest"]) > 1
                 ? " F is the farthest point on the wrong side under one more condition: the bisector of P and Q meets "
                   "the longer edge, `delta sin(2 theta) < L2 + L1 cos(2 theta)`. Otherwise the region OGF of Fig. 6 is "
                   "open instead of a triangle, and wrong signs end only where other samples are nearer. For equal "

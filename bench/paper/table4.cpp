@@ -35,7 +35,7 @@ double memoryAvailable() {
     return kiB * 1024;
 }
 
-constexpr double room = 1.2;  // the dense program runs only if this times its two grids is available
+constexpr double spareMemory = 1.2;  // the dense program runs only if this times its two grids is available
 
 // Peaks are measured first, in processes of their own: a process with threads cannot be forked.
 json peaks(const Mesh& box, const Lattice& lattice, bool fits) {
@@ -59,7 +59,7 @@ json measureTable4(const Run& run) {
     for (const published::Growth& paper : published::table4) {
         const Lattice lattice = latticeOf({paper.nodes[0], paper.nodes[1], paper.nodes[2]});
         const double bytes = 2.0 * sizeof(float) * double(lattice.count());
-        const bool fits = memoryAvailable() > room * bytes;
+        const bool fits = memoryAvailable() > spareMemory * bytes;
         rows.push_back(
             {{"nodes", paper.nodes}, {"fits", fits}, {"bytes", bytes}, {"peaks", peaks(model->mesh, lattice, fits)}});
     }

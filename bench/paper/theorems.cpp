@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/constants.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <random>
@@ -16,8 +15,6 @@ namespace {
 
 using glm::dvec2;
 using glm::dvec3;
-
-constexpr double pi = glm::pi<double>();
 
 class Dice {
   public:

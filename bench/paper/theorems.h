@@ -4,8 +4,11 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/gtc/constants.hpp>
 
 namespace bilayer::paper {
+
+inline constexpr double pi = glm::pi<double>();
 
 /// Theorem 1: `|d_e - d| < 2/3 L_max`, where d_e comes from one sample per triangle and L_max is the longest edge. The
 /// members are d_e - d above and below the true distance, divided by L_max.

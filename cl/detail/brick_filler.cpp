@@ -46,7 +46,7 @@ constexpr float minCellSide = 1.1f, aroundBrick = 3;
 /// Sizes in the kernels [bytes]: Piece of pieces.cl, Member and the columns of Groups in groups.cl, and the columns of
 /// a sample in samples.cl, with its cell and without.
 constexpr std::uint64_t pieceBytes = 112, memberBytes = 32, groupBytes = 32, unsortedSampleBytes = 32, sampleBytes = 28;
-constexpr const char* purpose = "a batch of bricks";  // of memory, for error texts
+constexpr const char* batchPurpose = "a batch of bricks";  // of memory, for error texts
 
 // `Layers` of layer_cubes.cl.
 struct KernelLayers {
@@ -167,12 +167,13 @@ BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const Fil
       guard_(device.queue) {
     const float reach = reachOf(job);
     if (mode_.fillsBricks)
-        orders_ = memory_.upload(bitOrders.data(), sizeof bitOrders, purpose, timing_.event(Timing::Command::upload));
+        orders_ =
+            memory_.upload(bitOrders.data(), sizeof bitOrders, batchPurpose, timing_.event(Timing::Command::upload));
     bins_.emplace(device, program_, memory_, job, reach, doubleLayer_ ? reach : reach + 1, mode_.gpuMapping, timing_);
     job.mesh.progress.begin(bins_->bricks());
     for (BrickBatch& batch : batches_) {
         batch.queue = cl::CommandQueue(device.context, device.device, CL_QUEUE_PROFILING_ENABLE);
-        batch.next = memory_.allocate(sizeof(cl_uint), purpose);
+        batch.next = memory_.allocate(sizeof(cl_uint), batchPurpose);
     }
     if (doubleLayer_) {
         bytes_ = {.unsorted = unsortedSampleBytes,

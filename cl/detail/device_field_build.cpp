@@ -25,10 +25,10 @@ extern const char* const field_build_cl;  // the text of field_build.cl
 
 namespace {
 
-constexpr std::size_t itemsAlongParts = 32;   // along z, which is contiguous in memory
-constexpr cl_int unknownEntry = -3;           // UNKNOWN of field_build.cl
-constexpr cl_float maxParts = 16;             // MAX_PARTS of field_build.cl
-constexpr const char* purpose = "the field";  // of memory, for error texts
+constexpr std::size_t itemsAlongParts = 32;        // along z, which is contiguous in memory
+constexpr cl_int unknownEntry = -3;                // UNKNOWN of field_build.cl
+constexpr cl_float maxParts = 16;                  // MAX_PARTS of field_build.cl
+constexpr const char* fieldPurpose = "the field";  // of memory, for error texts
 
 // `Widths` of field_build.cl.
 struct KernelWidths {
@@ -123,7 +123,7 @@ DeviceFieldBuilder::DeviceFieldBuilder(const Device& device, const OpenclOptions
       widths_{job.options.exteriorWidthVoxels, job.options.interiorWidthVoxels, job.mesh.voxelSize},
       timing_(options.profile),
       program_(buildProgram(device_, field_build_cl, commonBuildOptions(device_, gpuMapping_))),
-      summary_(memory.allocate(sizeof(Summary), purpose)),
+      summary_(memory.allocate(sizeof(Summary), fieldPurpose)),
       guard_(device_.queue) {}
 
 BuiltDeviceField DeviceFieldBuilder::run() {
@@ -150,7 +150,7 @@ BuiltDeviceField DeviceFieldBuilder::run() {
 
 void DeviceFieldBuilder::addPage(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
     if (blocks == 0) return;
-    const auto buffer = [&](std::uint64_t each) { return memory_.allocate(blocks * each, purpose); };
+    const auto buffer = [&](std::uint64_t each) { return memory_.allocate(blocks * each, fieldPurpose); };
     const Page page{cl_uint(blocks), buffer(sizeof(glm::ivec3)), buffer(blockVoxels * sizeof(float)),
                     buffer(sizeof(cl_int))};
     enqueueBlocks("trimBlocks", blocks, origins, distances,
@@ -163,7 +163,7 @@ void DeviceFieldBuilder::addPage(const cl::Buffer& origins, const cl::Buffer& di
 void DeviceFieldBuilder::addHostBlocks() {
     if (hostOrigins_.empty()) return;
     const auto uploaded = [&](const auto& data) {
-        return memory_.upload(data.data(), data.size() * sizeof data[0], purpose,
+        return memory_.upload(data.data(), data.size() * sizeof data[0], fieldPurpose,
                               timing_.event(Timing::Command::upload));
     };
     cl::Buffer origins = uploaded(hostOrigins_), distances = uploaded(hostDistances_);
@@ -197,14 +197,15 @@ void DeviceFieldBuilder::computeFrame() {
     frame.origin = glm::dvec3(firstVoxel_) * frame.voxel;
     frame.bounds = {glm::vec3(glm::dvec3(vectorOf(summary.activeLower)) * frame.voxel),
                     glm::vec3(glm::dvec3(vectorOf(summary.activeUpper)) * frame.voxel)};
-    layout_.values = memory_.allocate(std::uint64_t(summary.needed) * FieldFrame::blockFloats * sizeof(float), purpose);
+    layout_.values =
+        memory_.allocate(std::uint64_t(summary.needed) * FieldFrame::blockFloats * sizeof(float), fieldPurpose);
 }
 
 void DeviceFieldBuilder::placeBlocks() {
     const KernelFrame frame(layout_.frame);
     const cl_int4 first{{firstVoxel_.x, firstVoxel_.y, firstVoxel_.z, 0}};
-    cl::Buffer next = memory_.allocate(sizeof(cl_uint), purpose);
-    layout_.directory = memory_.allocate(entries() * sizeof(cl_int), purpose);
+    cl::Buffer next = memory_.allocate(sizeof(cl_uint), fieldPurpose);
+    layout_.directory = memory_.allocate(entries() * sizeof(cl_int), fieldPurpose);
     device_.queue.enqueueFillBuffer(next, cl_uint(0), 0, sizeof(cl_uint));
     device_.queue.enqueueFillBuffer(layout_.directory, unknownEntry, 0, entries() * sizeof(cl_int));
     for (const Page& page : pages_)
@@ -232,9 +233,9 @@ void DeviceFieldBuilder::computeClearances() {
     const glm::ivec3 size = layout_.frame.parts();
     const std::size_t count = std::size_t(size.x) * size.y * size.z;
     const cl_float far = layout_.frame.findsSurface() ? maxParts * maxParts : 0;
-    layout_.centres = memory_.allocate(count * sizeof(cl_char), purpose);
+    layout_.centres = memory_.allocate(count * sizeof(cl_char), fieldPurpose);
     std::array<cl::Buffer, 2> distances2;
-    for (cl::Buffer& buffer : distances2) buffer = memory_.allocate(count * sizeof(cl_float), purpose);
+    for (cl::Buffer& buffer : distances2) buffer = memory_.allocate(count * sizeof(cl_float), fieldPurpose);
     enqueueParts("initialiseParts", frame, far, layout_.directory, layout_.values, distances2[0], layout_.centres);
     for (cl_int axis = 2; axis >= 0; --axis) {
         enqueueParts("transformParts", frame, axis, distances2[0], distances2[1]);

@@ -21,7 +21,7 @@ constexpr double minBisectorLength = 1e-6;  // two faces that coincide to within
 constexpr double minDeterminant = 1e-9;     // side planes closer to parallel have no corner that the box must contain
 constexpr int blocksWorthCulling = 8;       // a prism whose box meets more blocks is tested against each
 
-using Triangle = std::array<glm::dvec3, 3>;
+using Corners = std::array<glm::dvec3, 3>;
 
 struct Box {
     glm::dvec3 lower, upper;
@@ -33,11 +33,11 @@ struct Box {
 
 // A triangle with its longest edge first, and the opposite vertices across its edges.
 struct Base {
-    Triangle corners;
+    Corners corners;
     std::array<std::optional<glm::dvec3>, 3> across;
 };
 
-Base baseOf(const PrismJob& job, std::uint32_t triangle, const Triangle& c, const glm::dvec3& first) {
+Base baseOf(const PrismJob& job, std::uint32_t triangle, const Corners& c, const glm::dvec3& first) {
     const auto length2 = [&](int k) {
         const glm::dvec3 edge = c[std::size_t((k + 1) % 3)] - c[std::size_t(k)];
         return glm::dot(edge, edge);
@@ -127,7 +127,7 @@ bool addCorner(const Shape& shape, int k, double reach, Box& box) {
 
 // A cross section of the prism at any height is a triangle similar to its own. So the vertices of its two ends bound
 // the prism.
-Box boxOf(const Shape& shape, const Triangle& corners, double reach) {
+Box boxOf(const Shape& shape, const Corners& corners, double reach) {
     Box near{corners[0], corners[0]};
     near.add(corners[1]);
     near.add(corners[2]);
@@ -250,7 +250,7 @@ void binPrisms(const PrismJob& job, const TriangleBins& bins, std::size_t brick,
     blocks.prisms.clear();
     blocks.pairs.clear();
     blocks.cursors.assign(std::size_t(blocksAlong) * std::size_t(blocksAlong) * std::size_t(blocksAlong), 0);
-    forEachTriangle(job.mesh, bins.trianglesOf(brick), job.voxelsPerUnit, [&](std::uint32_t t, const Triangle& c) {
+    forEachTriangle(job.mesh, bins.trianglesOf(brick), job.voxelsPerUnit, [&](std::uint32_t t, const Corners& c) {
         const Base base = baseOf(job, t, c, first);
         if (const auto shape = shapeOf(base))
             bin(*shape, boxOf(*shape, base.corners, double(job.reach)), double(job.reach), t, bins.side, blocks);

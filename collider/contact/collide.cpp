@@ -24,7 +24,7 @@ namespace bilayer::detail {
 namespace {
 
 // The outward normal of `other` in the world. Where its field has none, the reversed normal of the surface point.
-glm::vec3 outwardNormal(const Placed& other, const SurfaceSample& sample, const Placed& body,
+glm::vec3 contactNormal(const Placed& other, const SurfaceSample& sample, const Placed& body,
                         const SurfacePoint& point) {
     return sample.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * sample.normal;
 }
@@ -96,7 +96,7 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
     };
     const auto addOf = [&](const Placed& body, const Placed& other, bool isB) {
         return [&, isB](std::uint32_t index, const SurfacePoint& point, const SurfaceSample& sample) {
-            const glm::vec3 normal = outwardNormal(other, sample, body, point);
+            const glm::vec3 normal = contactNormal(other, sample, body, point);
             if (!passes(normal, body, other, point, sample)) return;
             const glm::vec3 place = body.pose.toWorld(body.scale * point.position);
             const float distance = sample.distance * other.scale;

@@ -30,7 +30,7 @@ std::uint64_t nextId() {
 }
 
 // Mass properties of a closed mesh's union, otherwise of the field's interior, which a flood may have widened.
-std::optional<MassProperties> massOf(const Mesh& oriented, const LevelSet& levelSet) {
+std::optional<MassProperties> meshOrFieldMass(const Mesh& oriented, const LevelSet& levelSet) {
     try {
         if (!balanced(oriented) || levelSet.sign() == nameOf(Sign::flood)) return massProperties(levelSet);
         // neither intersects itself nor has copies
@@ -72,7 +72,7 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
         throw std::invalid_argument(
             fmt::format("the margin of {:g} is wider than {} voxels", options.margin, maxMargin));
     Mesh oriented = orientedMesh(levelSet, std::move(given));
-    auto mass = massOf(oriented, levelSet);
+    auto mass = meshOrFieldMass(oriented, levelSet);
     Filled filled = filledMesh(outerSurface(levelSet, std::move(oriented)), levelSet);
     const auto mesh = std::make_shared<const Mesh>(std::move(filled.mesh));
     return {.points = SurfacePoints(*mesh, options.pointSpacingVoxels * levelSet.voxelSize()),

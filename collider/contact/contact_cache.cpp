@@ -11,9 +11,9 @@ namespace bilayer::detail {
 namespace {
 
 // Slack of a list. A longer slack keeps the list valid for more steps, but lists more points.
-constexpr float minSlack = 0.25f;   // [voxels]
-constexpr float minValidSteps = 8;  // the count of steps that a list should be valid for
-constexpr float rounding = 1e-5f;   // of positions, relative to the lengths that they come from
+constexpr float minSlack = 0.25f;          // [voxels]
+constexpr float minValidSteps = 8;         // the count of steps that a list should be valid for
+constexpr float positionRounding = 1e-5f;  // of positions, relative to the lengths that they come from
 const float halfRoot = std::sqrt(0.5f);
 
 bool isSameSearch(const CandidateLists::RelativePose& a, const CandidateLists::RelativePose& b) {
@@ -30,7 +30,7 @@ float maxDisplacement(const CandidateLists::RelativePose& from, const CandidateL
         glm::dot(change[0], change[0]) + glm::dot(change[1], change[1]) + glm::dot(change[2], change[2]);
     const glm::vec3 displacement = change * centre + (to.shift - from.shift);
     const float size = glm::length(to.shift) + glm::length(to.linear[0]) * (glm::length(centre) + radius);
-    return glm::length(displacement) + radius * halfRoot * std::sqrt(norm2) + rounding * size;
+    return glm::length(displacement) + radius * halfRoot * std::sqrt(norm2) + positionRounding * size;
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ constexpr float hysteresis = 3;
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
 // Upper limit of an additional tilt, for steps that move a body farther: the rotation of a body whose other side is
 // stopped [rad].
-constexpr float maxRotation = 1;
+constexpr float maxStepRotation = 1;
 constexpr float shiftSize = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float directionOffset = 0.3f;  // [rad]
@@ -100,7 +100,7 @@ class Separations {
                 first = std::min(first, contacts[i].remaining());
                 approach = std::max(approach, contacts[i].approach);
             }
-        rotation_ = extent_ > 0 ? std::min(approach / extent_, maxRotation) : 0;
+        rotation_ = extent_ > 0 ? std::min(approach / extent_, maxStepRotation) : 0;
         for (std::size_t k = 0; k < count_; ++k) {
             const Contact& contact = contacts[group[k]];
             const glm::vec3 torque = glm::cross(contact.position - centre, contact.normal);

@@ -74,7 +74,7 @@ glm::dvec3 areaOf(const std::vector<int>& polygon, std::span<const glm::vec3> po
 }
 
 /// Numbers the used points in the order of their use, and lists each edge once.
-HullSurface surfaceOf(const std::vector<std::vector<int>>& polygons, std::span<const glm::vec3> points) {
+HullSurface hullSurface(const std::vector<std::vector<int>>& polygons, std::span<const glm::vec3> points) {
     HullSurface surface;
     std::map<int, std::uint32_t> numbers;
     for (const std::vector<int>& polygon : polygons) {
@@ -114,7 +114,7 @@ HullSurface convexHullOf(std::span<const glm::vec3> points) {
         if (glm::dot(areaOf(polygon, points), outward) < 0) std::reverse(polygon.begin(), polygon.end());
         polygons.push_back(std::move(polygon));
     }
-    return surfaceOf(polygons, points);
+    return hullSurface(polygons, points);
 }
 
 }  // namespace bilayer::detail

@@ -12,12 +12,13 @@ namespace bilayer::detail {
 namespace {
 
 // Max error of samples [voxels].
-constexpr float tolerance = 0.1f;
+constexpr float errorTolerance = 0.1f;
 // Count of tested places along each axis of a cell.
 constexpr int places = 3;
 
 // Two bits per cell of a block: whether it has been tested, and the result.
-constexpr int side = FieldFrame::side, cellsPerWord = 32, wordsPerBlock = side * side * side / cellsPerWord;
+constexpr int blockEdge = FieldFrame::side, cellsPerWord = 32,
+              wordsPerBlock = blockEdge * blockEdge * blockEdge / cellsPerWord;
 constexpr std::uint64_t isTested = 1, isInaccurate = 2;
 
 }  // namespace
@@ -30,14 +31,14 @@ bool InterpolationErrorMask::hold(const glm::vec3& point) const noexcept {
     if (!field_) return false;
     const FieldLayout& layout = field_->data();
     const glm::dvec3 local = (glm::dvec3(point) - layout.origin) * layout.perMetre;
-    const glm::dvec3 extent = double(side) * glm::dvec3(layout.blocks);
+    const glm::dvec3 extent = double(blockEdge) * glm::dvec3(layout.blocks);
     if (!(local.x >= 0 && local.y >= 0 && local.z >= 0)) return false;
     if (!(local.x < extent.x && local.y < extent.y && local.z < extent.z)) return false;
-    const glm::ivec3 cell(local), inBlock = cell % side;
-    const std::int32_t block = layout.directory.data()[layout.entryOf(cell / side)];
+    const glm::ivec3 cell(local), inBlock = cell % blockEdge;
+    const std::int32_t block = layout.directory.data()[layout.entryOf(cell / blockEdge)];
     if (block < 0) return false;
 
-    const int index = (inBlock.x * side + inBlock.y) * side + inBlock.z, shift = 2 * (index % cellsPerWord);
+    const int index = (inBlock.x * blockEdge + inBlock.y) * blockEdge + inBlock.z, shift = 2 * (index % cellsPerWord);
     std::atomic<std::uint64_t>& word = known_[std::ptrdiff_t(block) * wordsPerBlock + index / cellsPerWord];
     std::uint64_t bits = word.load(std::memory_order_relaxed) >> shift;
     if (!(bits & isTested)) {
@@ -63,7 +64,7 @@ bool InterpolationErrorMask::isOff(const glm::dvec3& local) const noexcept {
     const Sample sample = field_->sample(place);
     if (!sample.inBand) return false;
     const ClosestPoint closest = field_->closest(place, std::abs(sample.distance) + maxInterpolationError * voxel);
-    return !(std::abs(closest.distance - sample.distance) <= tolerance * voxel);
+    return !(std::abs(closest.distance - sample.distance) <= errorTolerance * voxel);
 }
 
 }  // namespace bilayer::detail

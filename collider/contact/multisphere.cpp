@@ -11,11 +11,11 @@ namespace bilayer::detail {
 namespace {
 
 // Tolerance for rounding: spheres may protrude from a plane by this fraction of the hull's size.
-constexpr float rounding = 1e-5f;
+constexpr float sizeRounding = 1e-5f;
 // Minimum squared cosine between a cone and its axis; one sphere then contains the other up to rounding.
 constexpr double minSquaredCosine = 1e-12;
 
-glm::dvec3 perpendicularTo(const glm::dvec3& axis) {
+glm::dvec3 perpendicularAxis(const glm::dvec3& axis) {
     const glm::dvec3 other = std::abs(axis.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     return glm::normalize(glm::cross(axis, other));
 }
@@ -55,7 +55,7 @@ void MultisphereHull::addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t 
                                                v = glm::dvec3(spheres_[k].centre) - from;
     const glm::dvec3 square = glm::cross(u, v);
     const double area = glm::length(square);
-    if (area <= rounding * size_ * size_) return;
+    if (area <= sizeRounding * size_ * size_) return;
     // Along each side, the height over the plane falls by the difference of the radii.
     const double a = double(spheres_[i].radius) - spheres_[j].radius,
                  b = double(spheres_[i].radius) - spheres_[k].radius;
@@ -66,7 +66,7 @@ void MultisphereHull::addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t 
         const glm::dvec3 normal = along + side * std::sqrt(rest) * (square / area);
         const double offset = glm::dot(normal, from) + spheres_[i].radius;
         const auto below = [&](const SphereOfHull& sphere) {
-            return glm::dot(normal, glm::dvec3(sphere.centre)) + sphere.radius <= offset + rounding * size_;
+            return glm::dot(normal, glm::dvec3(sphere.centre)) + sphere.radius <= offset + sizeRounding * size_;
         };
         if (std::all_of(spheres_.begin(), spheres_.end(), below)) planes_.push_back({normal, offset, {i, j, k}});
     }
@@ -94,7 +94,7 @@ MultisphereHull::Candidate MultisphereHull::aroundPair(const SphereOfHull& from,
     if (part <= 0) return aroundSphere(from, point);
     if (part >= 1) return aroundSphere(to, point);
     const glm::dvec3 centre = start + part * between,
-                     normal = cosine * (out > 0 ? radial / out : perpendicularTo(axis)) + sine * axis;
+                     normal = cosine * (out > 0 ? radial / out : perpendicularAxis(axis)) + sine * axis;
     const double radius = from.radius + part * growth;
     return {glm::dot(point - centre, normal) - radius, normal, centre, radius};
 }
@@ -126,7 +126,7 @@ NearestPoint MultisphereHull::nearest(const glm::vec3& place, float) const {
         best = {distance, plane.normal, from + foot, radius};
     }
     // Between four or more spheres, the point may be inside although none of the above is near.
-    const bool isOutside = best.distance >= 0 && along(best.normal, point) >= best.distance - rounding * size_;
+    const bool isOutside = best.distance >= 0 && along(best.normal, point) >= best.distance - sizeRounding * size_;
     if (!isOutside && !planes_.empty()) best = inside(point);
     return {float(best.distance), glm::vec3(best.normal), glm::vec3(best.centre), float(best.radius)};
 }

@@ -16,7 +16,7 @@ constexpr float minDisplacement = 0.05f;
 // Maximum rotation of a prediction [rad]. Without speculative contacts, the points that take over are known only up to
 // a margin. A rotation then lifts no point off the surface by more than the second value [fractions of
 // sameWithin].
-constexpr float maxRotation = 0.5f, maxLift = 0.25f;
+constexpr float maxPredictedRotation = 0.5f, maxLift = 0.25f;
 // Predicted contacts touch slightly too early. Otherwise the points around the lowest one of a wheel penetrate by the
 // error of a step, and throw it up when they touch. The first value is a fraction of the curvature of their paths, the
 // second its limit [fractions of sameWithin].
@@ -64,7 +64,7 @@ std::optional<SurfaceSample> surfaceAt(const SteppedBody& of, const SurfaceSampl
 /// The time in which a body rotates a point no farther than the contacts are known.
 float PredictedContacts::maxSeconds(const SteppedBody& body, const glm::vec3& place) const {
     const float arm = glm::distance(place, body.centre);
-    const float maxAngle = isSpeculative_ ? maxRotation : std::sqrt(2 * maxLift * sameWithin_ / arm);
+    const float maxAngle = isSpeculative_ ? maxPredictedRotation : std::sqrt(2 * maxLift * sameWithin_ / arm);
     return maxAngle / glm::length(body.angular);  // infinite without rotation
 }
 

@@ -41,7 +41,7 @@ HalfSpace inWorld(const HalfSpace& solid, const Pose& pose) {
 }
 
 /// The contact as seen with the bodies in the other order.
-Contact swapped(Contact contact) {
+Contact swappedContact(Contact contact) {
     contact.position += contact.distance * contact.normal;
     contact.normal = -contact.normal;
     contact.feature ^= featureOfB;
@@ -105,7 +105,7 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
     const ContactReport report =
         order.isSwapped ? collideShape(b, placed(a), options, contacts) : collideShape(a, placed(b), options, contacts);
     if (order.isSwapped)
-        for (std::size_t i = first; i < contacts.size(); ++i) contacts[i] = swapped(contacts[i]);
+        for (std::size_t i = first; i < contacts.size(); ++i) contacts[i] = swappedContact(contacts[i]);
     removeInfinite(contacts, first);
     if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);
     return report;

@@ -21,7 +21,7 @@ constexpr float minNeighbourCosine = 0.5f;
 constexpr float maxNormalCosine = 0.7f;
 // Max rounding of sharp edges by the interpolant [voxels]; at larger distances there is a groove between the two
 // points.
-constexpr float onSurface = 0.45f;
+constexpr float sampleOnSurface = 0.45f;
 // Max height of a segment above the edge between its ends, as around a hole [voxels].
 constexpr float maxAbove = 0.05f;
 constexpr std::size_t maxNeighbours = 6;
@@ -82,7 +82,7 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
         if (kept.size() == maxNeighbours) break;
         if (std::any_of(kept.begin(), kept.end(), hides)) continue;
         const glm::vec3 middle = 0.5f * (point.position + points.points()[next.index].position);
-        if (std::abs(field.sample(middle).distance) <= onSurface * field.voxelSize()) kept.push_back(next);
+        if (std::abs(field.sample(middle).distance) <= sampleOnSurface * field.voxelSize()) kept.push_back(next);
     }
     return kept;
 }

@@ -17,7 +17,7 @@ namespace bilayer::detail {
 namespace {
 
 // Tolerance of the distance of a triangle [sizes of the mesh].
-constexpr double tolerance = 1e-8;
+constexpr double searchPrecision = 1e-8;
 // Weights of corners below this are rounding.
 constexpr double minWeight = 1e-9;
 // Each level of the tree leaves at most seven pending nodes.
@@ -59,7 +59,7 @@ class PosedConvex {
         : convex_(convex),
           toMesh_(toMesh),
           growth_(toMesh.scale * double(convex.growth())),
-          tolerance_(tolerance * size) {}
+          tolerance_(searchPrecision * size) {}
 
     double bound(const OrientedBounds& box) const {
         const NearestPoint nearest =

@@ -16,15 +16,15 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double latticePitch = 0.75;    // of candidates on edges and faces [spacings]
-constexpr double minGap = 0.7;           // min distance of points with about the same normal [spacings]
-constexpr double minLikeCosine = 0.7;    // min cosine between such normals: a cube's edge and its faces have 0.71
-constexpr double minProtrusion = 0.035;  // max height of a dropped candidate over such a point [spacings]
-constexpr double minCornerGap = 0.1;     // between convex vertices [spacings]: a fraction of a voxel
-constexpr double corner = 0.5;           // min convexity of a vertex: a cube's has 0.58
-constexpr double sharp = 0.15;           // min convexity of an edge: a cube's have 0.35
-constexpr std::uint32_t leafPoints = 8;  // max count of points in a leaf of the tree
-constexpr float rounding = 1.000001f;    // growth factor of spheres, against rounding in single precision
+constexpr double latticePitch = 0.75;      // of candidates on edges and faces [spacings]
+constexpr double minGap = 0.7;             // min distance of points with about the same normal [spacings]
+constexpr double minLikeCosine = 0.7;      // min cosine between such normals: a cube's edge and its faces have 0.71
+constexpr double minProtrusion = 0.035;    // max height of a dropped candidate over such a point [spacings]
+constexpr double minCornerGap = 0.1;       // between convex vertices [spacings]: a fraction of a voxel
+constexpr double corner = 0.5;             // min convexity of a vertex: a cube's has 0.58
+constexpr double sharpConvexity = 0.15;    // min convexity of an edge: a cube's have 0.35
+constexpr std::uint32_t leafPoints = 8;    // max count of points in a leaf of the tree
+constexpr float sphereGrowth = 1.000001f;  // growth factor of spheres, against rounding in single precision
 
 struct Candidate {
     glm::dvec3 position;
@@ -205,7 +205,8 @@ std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing
         const double gap = candidate.convexity >= corner ? minCornerGap : minGap;
         if (grid.hasNeighbour(candidate, gap * spacing, minProtrusion * spacing)) continue;
         grid.insert(candidate);
-        points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal), candidate.convexity >= sharp});
+        points.push_back(
+            {glm::vec3(candidate.position), glm::vec3(candidate.normal), candidate.convexity >= sharpConvexity});
     }
     return points;
 }
@@ -237,7 +238,7 @@ void addNode(const std::vector<SurfacePoint>& points, std::vector<PointNode>& no
     float radius = 0;
     for (std::uint32_t i = begin; i < end; ++i) radius = std::max(radius, glm::distance(centre, points[i].position));
     const std::size_t node = nodes.size();
-    nodes.push_back({centre, radius * rounding, begin, end, 0});
+    nodes.push_back({centre, radius * sphereGrowth, begin, end, 0});
 
     if (end - begin > leafPoints) {
         const std::uint32_t middle = begin + (end - begin) / 2;

@@ -25,7 +25,7 @@ constexpr std::size_t maxNodes = BlockEntries::maxEntries * BlockEntry::slots;
 constexpr double usual = 0.9;
 constexpr std::size_t samples = 512;
 constexpr std::uint32_t maxTreeNodes = 1 << 24;
-constexpr std::size_t grain = 256;  // cubes per task
+constexpr std::size_t cubesPerTask = 256;
 /// log2 of a cube's side [voxels]. A cube is one block, or larger if `fewEntries` entries hold the leaves near it.
 /// These are read as fast as one, and all of them fit into a cache that is too small for entries of single blocks.
 constexpr int blockShift = 3, maxShift = 5, fewEntries = 2;
@@ -217,7 +217,7 @@ BlockEntries::BlockEntries(const FieldLayout& field, const WideTree& tree, doubl
     placesPerVoxel_ = float(placesPerUnit * regionUnits) / (float(1 << shift_) + 2 * reach);
     entries_ = LargeArray<BlockEntry>(cubes.size() * std::size_t(each_));
     const EntryBuilder builder = builderOf();
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cubes.size(), grain), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cubes.size(), cubesPerTask), [&](const auto& range) {
         EntryBuilder own(builder);
         for (std::size_t i = range.begin(); i < range.end(); ++i)
             own.make(cubes[i], entries_.data() + i * std::size_t(each_), each_);

@@ -11,7 +11,7 @@ namespace bilayer::detail {
 namespace {
 
 constexpr int stride = FieldFrame::stride;
-constexpr int partSide = Clearance::partSide, perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
+constexpr int partSide = Clearance::partSide;
 
 // Minima and maxima of a quarter of a block, over x and y, by place along the last axis.
 struct Quarter {
@@ -50,9 +50,9 @@ bool needsBlock(const openvdb::FloatTree::LeafNodeType& leaf) {
 
 BlockSummary summaryOf(const float* block, float voxelSize) {
     BlockSummary summary;
-    for (int i = 0; i < blockParts; i += perBlock) {
+    for (int i = 0; i < Clearance::blockParts; i += Clearance::perBlock) {
         const Quarter quarter(block + partSide * stride * ((i >> 2) * stride + (i >> 1 & 1)));
-        for (int part = 0; part < perBlock; ++part) {
+        for (int part = 0; part < Clearance::perBlock; ++part) {
             const int first = part * partSide;
             const float lowest = *std::min_element(&quarter.lowest[first], &quarter.lowest[first] + partSide + 1),
                         highest = *std::max_element(&quarter.highest[first], &quarter.highest[first] + partSide + 1);

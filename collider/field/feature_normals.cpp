@@ -18,7 +18,7 @@ namespace bilayer::detail {
 namespace {
 
 /// Count of triangles per task.
-constexpr std::size_t grain = 4096;
+constexpr std::size_t featuresPerTask = 4096;
 
 // The contribution of a triangle to its features.
 struct Face {
@@ -52,7 +52,7 @@ bool sameOrientation(const glm::uvec3& a, const glm::uvec3& b) {
 class Faces {
   public:
     Faces(const Mesh& mesh, const Topology& topology, double thinnest) : faces_(topology.triangles.size()) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, faces_.size(), grain), [&](const auto& range) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, faces_.size(), featuresPerTask), [&](const auto& range) {
             for (std::size_t i = range.begin(); i < range.end(); ++i)
                 if (topology.proper(i)) faces_[i] = faceOf(mesh, topology.triangles[i], thinnest);
         });
@@ -108,7 +108,7 @@ std::vector<glm::vec3> edgeNormals(const Topology& topology, const Faces& faces)
             normals[3 * std::size_t(use.triangle) + std::size_t(from)] = mean;
         }
     };
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, topology.edges.size(), grain),
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, topology.edges.size(), featuresPerTask),
                       [&](const auto& range) { topology.forEdges(range.begin(), range.end(), visit); });
     return normals;
 }

@@ -29,8 +29,7 @@ using Accessor = openvdb::FloatGrid::ConstAccessor;
 
 constexpr int side = FieldLayout::side;
 constexpr std::int64_t maxBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
-constexpr int blockParts = Clearance::blockParts;
-constexpr int minSteps = 126;  // from 0 to the end of the band, for the stored minima
+constexpr int minSteps = 126;                // from 0 to the end of the band, for the stored minima
 
 [[noreturn]] void throwTooLong() {
     throw std::invalid_argument("the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
@@ -95,7 +94,7 @@ std::vector<SurfaceBlock> enterBlocks(FieldLayout& field, const FloatTree& tree,
         field.values = LargeArray<float>(floats);
     else
         field.values16 = LargeArray<std::int16_t>(floats);
-    field.minima = LargeArray<std::int8_t>(field.stored * blockParts);
+    field.minima = LargeArray<std::int8_t>(field.stored * Clearance::blockParts);
     std::vector<SurfaceBlock> surface(field.stored);
     const float minimaStep = minimaStepOf(field);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, field.stored), [&](const auto& range) {
@@ -111,8 +110,8 @@ std::vector<SurfaceBlock> enterBlocks(FieldLayout& field, const FloatTree& tree,
                 store(block.data(), field, field.step, field.values16.data() + i * FieldLayout::blockFloats);
             const BlockSummary summary = summaryOf(block.data(), field.voxelSize);
             surface[i] = {{origins[i].x(), origins[i].y(), origins[i].z()}, summary.meetsSurface};
-            for (int k = 0; k < blockParts; ++k)
-                field.minima[i * blockParts + k] =
+            for (int k = 0; k < Clearance::blockParts; ++k)
+                field.minima[i * Clearance::blockParts + k] =
                     std::int8_t(std::clamp(std::floor(summary.lowest[k] / minimaStep), -127.f, 127.f));
         }
     });

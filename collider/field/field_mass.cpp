@@ -37,10 +37,10 @@ namespace {
 using openvdb::Coord;
 using openvdb::FloatTree;
 
-constexpr int side = FieldFrame::side, stride = FieldFrame::stride;
-constexpr std::size_t grain = 64;       // blocks per partial sum: fixed, for reproducible sums
-constexpr double nextToSurface = 1e-6;  // distance of a corrected voxel that would otherwise change its sign [voxels]
-constexpr double minVolume = 1e-6;      // smaller volumes are rounding errors [voxels]
+constexpr int blockVoxels = FieldFrame::side, blockStride = FieldFrame::stride;
+constexpr std::size_t blocksPerSum = 64;  // blocks per partial sum: fixed, for reproducible sums
+constexpr double nextToSurface = 1e-6;    // distance of a corrected voxel that would otherwise change its sign [voxels]
+constexpr double minVolume = 1e-6;        // smaller volumes are rounding errors [voxels]
 const std::array<double, 2> gauss{0.5 - std::sqrt(1.0 / 12), 0.5 + std::sqrt(1.0 / 12)};  // points of equal weight
 
 using CellDistances = std::array<double, 8>;  // distances at the corners, z fastest [voxels]
@@ -49,7 +49,7 @@ glm::dvec3 vector(const Coord& at) {
     return {at.x(), at.y(), at.z()};
 }
 
-Coord corner(const Coord& at, int i) {
+Coord cornerOf(const Coord& at, int i) {
     return at.offsetBy(i >> 2, i >> 1 & 1, i & 1);
 }
 
@@ -88,7 +88,7 @@ void addInside(Moments& sum, const CellDistances& cell, const glm::dvec3& at) {
 // Subtracts the octants of negative voxels' cubes that lie in a cell.
 void takeCubes(Moments& sum, const CellDistances& cell, const glm::dvec3& at) {
     for (int i = 0; i < 8; ++i)
-        if (cell[i] < 0) sum.add(-0.125, at + 0.25 + 0.5 * vector(corner(Coord(0), i)), glm::dvec3(0.5));
+        if (cell[i] < 0) sum.add(-0.125, at + 0.25 + 0.5 * vector(cornerOf(Coord(0), i)), glm::dvec3(0.5));
 }
 
 // Integrates a field block by block, in voxels relative to a voxel in its middle.
@@ -105,18 +105,19 @@ class Integrator {
         const auto inside = std::count_if(block.values.begin(), block.values.end(), [](float v) { return v < 0; });
         const auto* leaf = accessor.probeConstLeaf(origin);
         if (leaf && inside == block.size)
-            sum.add(side * side * side, fromMiddle(origin) + 0.5 * (side - 1), glm::dvec3(side));
+            sum.add(blockVoxels * blockVoxels * blockVoxels, fromMiddle(origin) + 0.5 * (blockVoxels - 1),
+                    glm::dvec3(blockVoxels));
         if (inside == 0 || inside == block.size) return;
 
         block.corrected.fill(std::numeric_limits<double>::quiet_NaN());
-        for (int x = 0; x < side; ++x)
-            for (int y = 0; y < side; ++y)
-                for (int z = 0; z < side; ++z) {
+        for (int x = 0; x < blockVoxels; ++x)
+            for (int y = 0; y < blockVoxels; ++y)
+                for (int z = 0; z < blockVoxels; ++z) {
                     const Coord at(x, y, z);
                     if (leaf && block.values[BlockValues::index(at)] < 0)
                         sum.add(1, fromMiddle(origin + at), glm::dvec3(1));
                     int count = 0;
-                    for (int i = 0; i < 8; ++i) count += block.values[BlockValues::index(corner(at, i))] < 0;
+                    for (int i = 0; i < 8; ++i) count += block.values[BlockValues::index(cornerOf(at, i))] < 0;
                     if (count != 0 && count != 8) addCell(sum, block, accessor, origin, at);
                 }
     }
@@ -139,7 +140,7 @@ class Integrator {
         std::array<float, size> values;
         std::array<double, size> corrected;  // NaN until computed
 
-        static int index(const Coord& at) { return (at.x() * stride + at.y()) * stride + at.z(); }
+        static int index(const Coord& at) { return (at.x() * blockStride + at.y()) * blockStride + at.z(); }
     };
 
     glm::dvec3 fromMiddle(const Coord& at) const { return vector(at - middle_); }
@@ -166,8 +167,8 @@ class Integrator {
                  const Coord& origin, const Coord& at) const {
         CellDistances cell;
         for (int i = 0; i < 8; ++i) {
-            double& value = block.corrected[BlockValues::index(corner(at, i))];
-            if (std::isnan(value)) value = corrected(accessor, origin + corner(at, i));
+            double& value = block.corrected[BlockValues::index(cornerOf(at, i))];
+            if (std::isnan(value)) value = corrected(accessor, origin + cornerOf(at, i));
             cell[i] = value;
         }
         addInside(sum, cell, fromMiddle(origin + at));
@@ -185,7 +186,8 @@ std::vector<Coord> blocksOf(const FloatTree& tree) {
     blocks.reserve(8 * tree.leafCount());
     for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
         for (int i = 0; i < 8; ++i)
-            blocks.push_back(leaf->origin().offsetBy(-side * (i >> 2), -side * (i >> 1 & 1), -side * (i & 1)));
+            blocks.push_back(
+                leaf->origin().offsetBy(-blockVoxels * (i >> 2), -blockVoxels * (i >> 1 & 1), -blockVoxels * (i & 1)));
     tbb::parallel_sort(blocks.begin(), blocks.end());
     blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
     return blocks;
@@ -200,7 +202,7 @@ MassProperties massProperties(const LevelSet& levelSet) {
     const Integrator integrator(grid, middle);
     const std::vector<Coord> blocks = blocksOf(grid.tree());
     Moments sum = tbb::parallel_deterministic_reduce(
-        tbb::blocked_range<std::size_t>(0, blocks.size(), grain), Moments{},
+        tbb::blocked_range<std::size_t>(0, blocks.size(), blocksPerSum), Moments{},
         [&](const auto& range, Moments part) {
             for (std::size_t i = range.begin(); i < range.end(); ++i) integrator.addBlock(part, blocks[i]);
             return part;

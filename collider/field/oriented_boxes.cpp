@@ -21,11 +21,11 @@ namespace {
 constexpr int orientedLevels = 3;
 /// Margin of boxes for the rounding of vertices to floats [voxels].
 constexpr float roundingRoom = 1e-5f;
-constexpr std::size_t grain = 16;  // groups per task
-constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr std::size_t groupsPerTask = 16;
+constexpr float unbounded = std::numeric_limits<float>::infinity();
 
 struct Box {
-    glm::vec3 lower{infinity}, upper{-infinity};
+    glm::vec3 lower{unbounded}, upper{-unbounded};
 
     void add(const glm::vec3& p) { lower = glm::min(lower, p), upper = glm::max(upper, p); }
     float halfArea() const {
@@ -118,7 +118,7 @@ LargeArray<OrientedBoxes> makeOrientedBoxes(const WideTree& tree) {
     std::uint32_t begin = 0, children = tree.leafCount, leavesInChild = 1;
     for (int level = 0; begin < tree.groupCount; ++level) {
         const std::uint32_t count = (children + treeWidth - 1) / treeWidth;
-        tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, grain), [&](const auto& range) {
+        tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, groupsPerTask), [&](const auto& range) {
             for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
                 const LeafRange leaves{i * treeWidth * leavesInChild, leavesInChild,
                                        std::min(tree.leafCount, (i + 1) * treeWidth * leavesInChild)};

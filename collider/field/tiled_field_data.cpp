@@ -18,7 +18,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr int side = FieldFrame::side;
+constexpr int blockEdgeVoxels = FieldFrame::side;
 
 // Of a place along one axis, in the fixed point of samples. Unsigned: negative, huge and NaN coordinates are out of
 // range of any directory.
@@ -29,8 +29,8 @@ std::uint32_t blockAlong(double perMetre, double offset, float coordinate) {
 
 bool overlap(const PlacedTile& a, const PlacedTile& b, int margin) {
     const glm::ivec3 reach(margin);
-    return glm::all(glm::lessThan(a.first - reach, b.first + side * b.blocks)) &&
-           glm::all(glm::lessThan(b.first, a.first + side * a.blocks + reach));
+    return glm::all(glm::lessThan(a.first - reach, b.first + blockEdgeVoxels * b.blocks)) &&
+           glm::all(glm::lessThan(b.first, a.first + blockEdgeVoxels * a.blocks + reach));
 }
 
 }  // namespace
@@ -86,14 +86,14 @@ void TiledFieldData::readFrame() {
     first_ = glm::ivec3(std::numeric_limits<int>::max());
     for (const SurfaceBlock& block : surface_) {
         first_ = glm::min(first_, block.first);
-        end = glm::max(end, block.first + side);
+        end = glm::max(end, block.first + blockEdgeVoxels);
     }
     frame_.voxel = grid.voxelSize()[0];
     frame_.perMetre = 1 / frame_.voxel;
     frame_.voxelSize = tile.voxelSize();
     frame_.exteriorWidth = tile.exteriorWidth();
     frame_.interiorWidth = tile.interiorWidth();
-    frame_.blocks = (end - first_) / side;
+    frame_.blocks = (end - first_) / blockEdgeVoxels;
     frame_.origin = placeOf(first_);
     frame_.bounds = {glm::vec3(placeOf(lower)), glm::vec3(placeOf(upper))};
     fixedOffset_ = FieldData::fixedPoint - frame_.origin * frame_.perMetre;
@@ -101,12 +101,12 @@ void TiledFieldData::readFrame() {
 
 // The lower neighbours belong to a tile's directory: a point on the border may be rounded to either side.
 void TiledFieldData::placeTiles() {
-    const glm::ivec3 end = first_ + side * frame_.blocks;
+    const glm::ivec3 end = first_ + blockEdgeVoxels * frame_.blocks;
     for (std::size_t tile = 0; tile < tileCount(); ++tile) {
         const BlockBox& box = manifest_.tiles[tile].box;
         PlacedTile& placed = placed_[tile];
-        placed.first = glm::max(box.first - side, first_);
-        placed.blocks = glm::max((glm::min(box.end, end) - placed.first) / side, glm::ivec3(0));
+        placed.first = glm::max(box.first - blockEdgeVoxels, first_);
+        placed.blocks = glm::max((glm::min(box.end, end) - placed.first) / blockEdgeVoxels, glm::ivec3(0));
         placed.shift = glm::dvec3(placed.first - first_);
         placed.lower = glm::dvec3(glm::max(box.first, first_) - first_);
         placed.upper = glm::dvec3(glm::min(box.end, end) - first_);
@@ -116,7 +116,7 @@ void TiledFieldData::placeTiles() {
             glm::ivec3 place(0);
             place[axis] = i;
             starts_[std::size_t(axis)].push_back((manifest_.tiles[manifest_.at(place)].box.first[axis] - first_[axis]) /
-                                                 side);
+                                                 blockEdgeVoxels);
         }
 }
 
@@ -181,7 +181,7 @@ std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
 std::vector<SurfaceBlock> TiledFieldData::surfaceAround(const PlacedTile& tile) const {
     std::vector<SurfaceBlock> around;
     for (const PlacedTile& other : placed_)
-        if (overlap(tile, other, side * clearanceReach))
+        if (overlap(tile, other, blockEdgeVoxels * clearanceReach))
             around.insert(around.end(), surface_.begin() + std::ptrdiff_t(other.surface),
                           surface_.begin() + std::ptrdiff_t(other.surfaceEnd));
     return around;

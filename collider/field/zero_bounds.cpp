@@ -8,7 +8,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double noLimit = std::numeric_limits<double>::infinity();
 /// Accuracy of a multiplier, in distance from the plane, and max count of steps. There are at most three kinks.
 constexpr double multiplierTolerance = 1e-9;
 constexpr int maxMultipliers = 8;
@@ -39,7 +39,7 @@ Separation separation(const glm::dvec3& point, const CubeExpansion& cube) noexce
         const double excess = glm::dot(normal, offset) - beyond;
         if (std::abs(excess) <= multiplierTolerance) break;
         // unclamped coordinates follow the multiplier; if there are none, up to the next one that is released
-        double slope = 0, next = infinity;
+        double slope = 0, next = noLimit;
         for (int k = 0; k < 3; ++k) {
             const double free = -multiplier * normal[k];
             if (free > low[k] && free < high[k]) slope += normal[k] * normal[k];
@@ -52,7 +52,7 @@ Separation separation(const glm::dvec3& point, const CubeExpansion& cube) noexce
         offset = glm::clamp(-multiplier * normal, low, high);
     }
     const double length = glm::length(offset);
-    if (!(length > 0)) return {glm::dvec3(1, 0, 0), -infinity};
+    if (!(length > 0)) return {glm::dvec3(1, 0, 0), -noLimit};
     const glm::dvec3 direction = offset / length;
     if (!slices) return {direction, length};
     const double weight = multiplier / length;

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Min clearance for a ray to skip empty space; below it, visiting the next coarse cell is faster.
-constexpr double minStride = 6;
+constexpr double minCubeStride = 6;
 /// Accuracy of a crossing along a path.
 constexpr double crossingTolerance = 1e-9;
 
@@ -170,7 +170,7 @@ std::optional<double> firstInside(const FieldData& field, const Path& path) noex
         const std::int32_t entry = entryAt(field, Clearance::partSide * walk.cube);
         if (entry == FieldFrame::emptyInside) return walk.enter;
         const double stride = clearanceAt(field, path.at(walk.enter));
-        if (stride >= minStride) {
+        if (stride >= minCubeStride) {
             if (isPartInside(field, entry, walk.cube)) return walk.enter;
             walk = GridWalk(path, Clearance::partSide, glm::ivec3(0), parts, walk.enter + stride, to);
             continue;

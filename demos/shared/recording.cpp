@@ -31,7 +31,7 @@ namespace bilayer::demo {
 namespace {
 
 constexpr const char* threeFolder = "/usr/share/javascript/three/";  // where Debian's libjs-three puts three.js
-constexpr float steps = 65535;                                       // of a 16-bit coordinate
+constexpr float coordinateSteps = 65535;                             // of a 16-bit coordinate
 constexpr float quaternionSteps = 32767;                             // of a signed 16-bit component
 constexpr float changingSteps = 4095;                                // of a coordinate of a surface that changes
 
@@ -75,7 +75,7 @@ struct Quantised {
 void append(Quantised& to, const glm::vec3& point) {
     for (int axis = 0; axis < 3; ++axis) {
         const float size = std::max(to.box.size()[axis], 1e-9f);  // avoids a division by zero for a flat box
-        to.steps.push_back(std::uint16_t(std::lround((point[axis] - to.box.lower[axis]) / size * steps)));
+        to.steps.push_back(std::uint16_t(std::lround((point[axis] - to.box.lower[axis]) / size * coordinateSteps)));
     }
 }
 

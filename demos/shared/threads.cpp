@@ -23,7 +23,7 @@ const double flankRise = std::sqrt(3.0);                // slope of a thread's f
 const double threadHeight = 5.0 / 16 * std::sqrt(3.0);  // from crest to root, 5/8 H [pitches]
 
 // Smooth step from 0 at `low` to 1 at `high`, with zero slope at both.
-double smoothStep(double low, double high, double x) {
+double smoothRise(double low, double high, double x) {
     const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
     return t * t * (3 - 2 * t);
 }
@@ -139,8 +139,8 @@ Mesh bolt(const Bolt& part) {
     const double end = wall.plainEnd(), start = std::max(plain, end);
     require(length > start + pitch + depth + end, "a bolt must be longer than its thread runs out");
     wall.radius = [&](double phase, double z) {
-        const double groove = smoothStep(start, start + pitch, z) * (profile.crest - profile.radius(phase));
-        return profile.root + smoothStep(end, end + depth, length - z) * (depth - groove);
+        const double groove = smoothRise(start, start + pitch, z) * (profile.crest - profile.radius(phase));
+        return profile.root + smoothRise(end, end + depth, length - z) * (depth - groove);
     };
     wall.add(mesh, bearing, tip, false);
     return mesh;
@@ -167,7 +167,7 @@ Mesh nut(const Nut& part) {
     const double end = wall.plainEnd(), depth = (mouth - profile.root) / mouthSlope;
     require(half > end + depth, "a nut must be higher than its mouths are deep");
     wall.radius = [&](double phase, double z) {
-        const double widened = 1 - smoothStep(end, end + depth, half - std::abs(z)), r = profile.radius(phase);
+        const double widened = 1 - smoothRise(end, end + depth, half - std::abs(z)), r = profile.radius(phase);
         return roundHole(r + widened * (mouth - r), n)(0);
     };
     wall.add(mesh, bottom, top, true);

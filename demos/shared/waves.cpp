@@ -16,7 +16,7 @@
 namespace bilayer::demo {
 namespace {
 
-constexpr float bottom = -0.4f;  // of the closed solid [m]
+constexpr float solidBottom = -0.4f;  // of the closed solid [m]
 
 /// Bullet keeps a pointer to the heights.
 struct HeightField {
@@ -96,7 +96,7 @@ void Waves::addSolid() {
         for (int i = 0; i <= cellsX_; ++i) solid_.points.push_back(cornerAt(i, j));
     for (unsigned i = 0; i < below; ++i) {
         const glm::vec3 point = solid_.points[i];
-        solid_.points.emplace_back(point.x, point.y, bottom);
+        solid_.points.emplace_back(point.x, point.y, solidBottom);
     }
     // squares are divided in the same way as in a btHeightfieldTerrainShape
     for (unsigned j = 0; j + 1 < rows; ++j)
@@ -121,7 +121,7 @@ void Waves::addSolid() {
 }
 
 float Waves::highestAround(float x, float y, float distance) const {
-    float highest = bottom;
+    float highest = solidBottom;
     const float reach = distance + options_.cell;
     for (int j = 0; j <= cellsY_; ++j)
         for (int i = 0; i <= cellsX_; ++i)

@@ -168,7 +168,7 @@ void addVelocity(Solid& solid, const Velocity& velocity, const glm::vec3& centre
     solid.velocity->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
 }
 
-void check(const SolidOptions& options, const Transform& cells) {
+void checkCells(const SolidOptions& options, const Transform& cells) {
     if (!cells.isLinear() || !cells.hasUniformScale()) throw std::invalid_argument("the cells must be cubes");
     const double voxel = cells.voxelSize()[0];
     for (int axis = 0; axis < 3; ++axis) {
@@ -193,7 +193,7 @@ std::function<bool(float)> halfOf(const std::function<bool(float)>& progress, fl
 
 template <class Body>
 Solid solidOf(const Body& body, const Placement& placement, const Transform& cells, const SolidOptions& options) {
-    check(options, cells);
+    checkCells(options, cells);
     const float voxel = float(cells.voxelSize()[0]);
     Solid solid;
     solid.distance = regrid(body, placement, cells, options.halfWidthVoxels * voxel, halfOf(options.progress, 0));

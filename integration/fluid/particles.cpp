@@ -17,7 +17,6 @@
 #include "integration/fluid/detail/placement.h"
 #include "integration/fluid/detail/regrid.h"
 #include "sdf/base/openvdb_points.h"
-#include "sdf/base/polled_loop.h"
 
 namespace bilayer::fluid {
 
@@ -102,7 +101,7 @@ Particles gather(const std::vector<Coord>& origins, const ParticleOptions& optio
     std::vector<std::vector<glm::vec3>> parts(origins.size());
     Progress progress(options.progress);
     progress.begin(origins.size());
-    forAllPolled(origins.size(), 1, nullptr, [&](std::size_t i) {
+    tbb::parallel_for(std::size_t(0), origins.size(), [&](std::size_t i) {
         fill(origins[i], parts[i]);
         progress.advance();
     });

@@ -128,7 +128,7 @@ py::bytes packed(const LevelSet& levelSet) {
     return bytesOf(all);
 }
 
-LevelSet unpacked(const py::object& packed) {
+LevelSet unpackedLevelSet(const py::object& packed) {
     const openvdb::GridPtrVec all = gridsOf(packed);
     auto grids = std::make_shared<Grids>();
     for (const auto& grid : all) {
@@ -273,7 +273,7 @@ Raises ValueError for a value out of range.
 True
 )";
 
-constexpr const char* saveDoc = R"(save(path, half_float=False)
+constexpr const char* saveLevelSetDoc = R"(save(path, half_float=False)
 
 Writes a .vdb file, which Houdini, Blender and ParaView open, or a .nvdb file for code on a GPU. The file appears whole
 or not at all.
@@ -310,7 +310,7 @@ void addLevelSet(py::module_& module) {
     defineMethod(type, sparseDoc, sparse);
     defineMethod(type, surfaceDoc, extract);
     defineMethod(type, extendedDoc, extended);
-    defineMethod(type, saveDoc, save);
+    defineMethod(type, saveLevelSetDoc, save);
     defineStatic(type, loadDoc, load);
     type.def_property_readonly("voxel_size", &LevelSet::voxelSize, "Edge of a voxel, in the mesh's unit.")
         .def_property_readonly(
@@ -352,7 +352,7 @@ void addLevelSet(py::module_& module) {
         .def("__repr__", [](const LevelSet& self) {
             return fmt::format("LevelSet({} active voxels of {:g})", self.activeVoxels(), self.voxelSize());
         });
-    defineReduce(type, "_unpacked(packed) -> LevelSet", unpacked, packed);
+    defineReduce(type, "_unpacked(packed) -> LevelSet", unpackedLevelSet, packed);
 }
 
 }  // namespace bilayer::python

@@ -194,7 +194,7 @@ Raises ValueError for another shape or last row.
 [0.0, 2.0]
 )";
 
-constexpr const char* saveDoc = R"(save(path)
+constexpr const char* saveMeshDoc = R"(save(path)
 
 Writes an .obj, .ply or .stl file, whole or not at all.
 
@@ -212,7 +212,7 @@ void addMesh(py::module_& module) {
     defineConstructor(type, meshDoc, makeMesh);
     defineMethod(type, weldedDoc, weldedMesh);
     defineMethod(type, transformedDoc, transform);
-    defineMethod(type, saveDoc, write);
+    defineMethod(type, saveMeshDoc, write);
     type.def_property_readonly(
             "vertices",
             [](const py::object& self) {

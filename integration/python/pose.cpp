@@ -82,7 +82,7 @@ py::object mapped(const py::object& object, Map map) {
 }
 
 // Restores a pose to the bit, without the normalization of a new one.
-Pose unpacked(const py::object& packed) {
+Pose unpackedPose(const py::object& packed) {
     const Floats numbers(packed, "packed", {7}, Range::finite, Items::one);
     const auto n = numbers.as<float>();
     return {{n[0], n[1], n[2]}, glm::quat(n[3], n[4], n[5], n[6])};
@@ -177,7 +177,7 @@ void addPose(py::module_& module) {
             const glm::quat& q = pose.rotation;
             return fmt::format("Pose(({}, {}, {}), ({}, {}, {}, {}))", p.x, p.y, p.z, q.w, q.x, q.y, q.z);
         });
-    defineReduce(type, "_unpacked(packed) -> Pose", unpacked, [](const Pose& pose) {
+    defineReduce(type, "_unpacked(packed) -> Pose", unpackedPose, [](const Pose& pose) {
         const glm::vec3& p = pose.position;
         const glm::quat& q = pose.rotation;
         return py::make_tuple(p.x, p.y, p.z, q.w, q.x, q.y, q.z);

@@ -43,12 +43,12 @@ std::vector<Sample> samplesAt(const TiledFieldObject& field, std::span<const glm
     });
 }
 
-py::object sample(const TiledFieldObject& field, const py::object& object) {
+py::object sampleTiled(const TiledFieldObject& field, const py::object& object) {
     const Floats points(object, "points", {3});
     return samplesOf(samplesAt(field, points.points()), points.shape());
 }
 
-py::object inside(const TiledFieldObject& field, const py::object& object) {
+py::object insideTiled(const TiledFieldObject& field, const py::object& object) {
     const Floats points(object, "points", {3});
     const std::vector<Sample> samples = samplesAt(field, points.points());
     py::array_t<bool> array(points.shape());
@@ -57,7 +57,7 @@ py::object inside(const TiledFieldObject& field, const py::object& object) {
     return points.shape().empty() ? array[py::tuple()] : py::object(array);
 }
 
-py::object closest(const TiledFieldObject& field, const py::object& object, const py::object& maxDistance) {
+py::object closestTiled(const TiledFieldObject& field, const py::object& object, const py::object& maxDistance) {
     Floats points(object, "points", {3}), limits(maxDistance, "max_distance", {}, Range::positiveOrInfinite);
     const Shape shape = broadcast({&points, &limits});
     std::vector<ClosestPoint> answers(points.points().size());
@@ -68,8 +68,8 @@ py::object closest(const TiledFieldObject& field, const py::object& object, cons
     return closestPointsOf(std::move(answers), shape);
 }
 
-py::object raycast(const TiledFieldObject& field, const py::object& origins, const py::object& directions,
-                   const py::object& maxDistance) {
+py::object raycastTiled(const TiledFieldObject& field, const py::object& origins, const py::object& directions,
+                        const py::object& maxDistance) {
     Rays rays(origins, directions, maxDistance);
     const Shape shape = broadcast({&rays.origins, &rays.directions, &rays.lengths});
     return hits(shape, rays.origins.points().size(), [&](std::size_t begin, std::size_t count, auto found) {
@@ -78,7 +78,7 @@ py::object raycast(const TiledFieldObject& field, const py::object& origins, con
     });
 }
 
-TiledFieldObject makeField(const Path& folder, std::uint64_t budget, const std::string& storage) {
+TiledFieldObject makeTiledField(const Path& folder, std::uint64_t budget, const std::string& storage) {
     const FieldOptions options{byWord(storages, storage, "storage")};
     const WithoutGil release;
     return {TiledField(folder.text, std::size_t(budget), options), detail::readTileManifest(folder.text).origin};
@@ -88,11 +88,11 @@ TiledFieldObject makeField(const Path& folder, std::uint64_t budget, const std::
 
 void addTiledField(py::module_& module) {
     py::class_<TiledFieldObject> type(module, "TiledField", tiledFieldDoc);
-    defineConstructor(type, tiledFieldDoc, makeField);
-    defineMethod(type, tiledSampleDoc, sample);
-    defineMethod(type, tiledClosestDoc, closest);
-    defineMethod(type, tiledInsideDoc, inside);
-    defineMethod(type, tiledRaycastDoc, raycast);
+    defineConstructor(type, tiledFieldDoc, makeTiledField);
+    defineMethod(type, tiledSampleDoc, sampleTiled);
+    defineMethod(type, tiledClosestDoc, closestTiled);
+    defineMethod(type, tiledInsideDoc, insideTiled);
+    defineMethod(type, tiledRaycastDoc, raycastTiled);
     type.def_property_readonly(
             "voxel_size", [](const TiledFieldObject& self) { return self.voxelSize(); },
             "Edge of a voxel, in the mesh's unit.")

@@ -8,6 +8,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <glm/vec3.hpp>
+
 // The signatures are those of version 10; the thread sanitizer does not see into the library.
 #if OPENVDB_LIBRARY_MAJOR_VERSION_NUMBER == 10 && defined(OPENVDB_USE_EXPLICIT_INSTANTIATION) && defined(__GNUC__) && \
     !defined(__SANITIZE_THREAD__)
@@ -73,3 +75,12 @@ BILAYER_COMPILED_TREE(openvdb::Int32Tree::RootNodeType)
 BILAYER_COMPILED_TREE(openvdb::FloatTree::RootNodeType)
 BILAYER_COMPILED_TREE(openvdb::DoubleTree::RootNodeType)
 BILAYER_COMPILED_TREE(openvdb::Vec3STree::RootNodeType)
+
+namespace bilayer::detail {
+
+/// Returns a voxel's index as OpenVDB has it.
+inline openvdb::Coord coordOf(const glm::ivec3& voxel) {
+    return {voxel.x, voxel.y, voxel.z};
+}
+
+}  // namespace bilayer::detail

@@ -12,9 +12,10 @@
 
 namespace bilayer::detail {
 
-/// Calls body(i) for each i below `count` in parallel, in ranges of `grain`. Throws Cancelled.
+/// Calls body(i) for each i below `count` in parallel, in ranges of `grain`: by default for small work on each. Throws
+/// Cancelled.
 template <class Body>
-void forAllPolled(std::size_t count, std::size_t grain, Progress* progress, const Body& body) {
+void forAllPolled(std::size_t count, Progress* progress, const Body& body, std::size_t grain = 1024) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             if (i % grain == 0) poll(progress);

@@ -26,7 +26,6 @@ constexpr int digitBits = 12;
 constexpr std::size_t digits = std::size_t(1) << digitBits;
 static_assert(keyBits % digitBits == 0 && keyBits + indexBits == 64);
 constexpr std::size_t keysPerRun = 1 << 15;  // keys that one task sorts at a time; greater than `digits`
-constexpr std::size_t grain = 1024;          // groups per task
 /// Min count of items for which splitting starts another task.
 constexpr std::size_t worthSplitting = 1 << 15;
 /// On average, each round of the selection halves the range until it is short. After this many rounds std::nth_element
@@ -191,7 +190,7 @@ void BoxTree::joinBoxes(Progress* progress) {
         for (std::uint32_t i = 0; i < count; ++i) groups[begin + i].firstChild = firstChild + i * treeWidth;
         emptyBoxes(groups[begin + count - 1], children - (count - 1) * treeWidth);
         if (count == 1) return;
-        forAllPolled(count, grain, progress, [&](std::size_t i) {
+        forAllPolled(count, progress, [&](std::size_t i) {
             joinInto(groups[begin + i], groups[begin + count + i / treeWidth], i % treeWidth);
         });
         firstChild = leafCount + begin;

@@ -135,10 +135,11 @@ OrientedGroups orientedGroups(const Mesh& mesh, const BoxTree& boxes, const Larg
         std::size_t first = 0, each = 1;  // of the level: its first group, and the leaves of a child
         for (const std::size_t count : counts) {
             const std::size_t all = each * treeWidth, grain = std::max<std::size_t>(1, triangles / (all * treeWidth));
-            forAllPolled(count, grain, progress, [&](std::size_t i) {
+            const auto visitGroup = [&](std::size_t i) {
                 const Leaves own{leaves, i * all, std::min((i + 1) * all, leaves.size()), lastLeaf};
                 visit(result.groups[first + i], own, each);
-            });
+            };
+            forAllPolled(count, progress, visitGroup, grain);
             first += count;
             each = all;
         }

@@ -16,7 +16,6 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t grain = 1024;  // leaves or triangles per task
 /// Rounding error of a box test in double precision, relative to the max coordinate; generous.
 constexpr double roundingOfBoxes = 1e-12;
 /// Minimum speed of a line along an axis: with it, the line stays between two planes for longer than any box is wide.
@@ -164,7 +163,7 @@ bool TriangleTree::isCrowded() const {
 
 TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh), count_(mesh.triangles.size()) {
     auto items = vectorOf<TreeItem>(count_, progress);
-    forAllPolled(count_, grain, progress, [&](std::size_t i) { items[i] = itemOf(mesh, unsigned(i)); });
+    forAllPolled(count_, progress, [&](std::size_t i) { items[i] = itemOf(mesh, unsigned(i)); });
     build(std::move(items), progress);
 }
 
@@ -181,7 +180,7 @@ void TriangleTree::build(std::vector<TreeItem> order, Progress* progress) {
     sortBySplitting(order, progress);
     boxes_.makeRoom((order.size() + treeWidth - 1) / treeWidth);
     leaves_ = LargeArray<TriangleLeaf>(boxes_.leafCount);
-    forAllPolled(leaves_.size(), grain, progress, [&](std::size_t index) {
+    forAllPolled(leaves_.size(), progress, [&](std::size_t index) {
         TriangleLeaf& leaf = leaves_[index];
         Bounds box;
         for (std::size_t i = 0; i < treeWidth; ++i) {

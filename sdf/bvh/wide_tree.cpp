@@ -22,18 +22,12 @@ namespace {
 
 /// Floats represent all integers up to twice this [voxels].
 constexpr double maxMeshVoxels = 1 << 23;
-constexpr std::size_t grain = 1024;  // triangles or leaves per task
 
 struct DoubleBounds {
     glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
 
     void add(const glm::dvec3& p) { lower = glm::min(lower, p), upper = glm::max(upper, p); }
 };
-
-template <class Body>
-void forAll(std::size_t count, Progress* progress, Body body) {
-    forAllPolled(count, grain, progress, body);
-}
 
 // The items of the tree: triangles that are short enough, and the parts of longer ones.
 class TriangleParts {
@@ -133,7 +127,7 @@ std::vector<std::uint32_t> addKeys(const TriangleParts& parts, const glm::ivec3&
     keys.resize(parts.count());
     tbb::enumerable_thread_specific<std::vector<std::uint32_t>> found;
     const std::size_t runs = (keys.size() - begin + CurveCells::capacity - 1) / CurveCells::capacity;
-    forAll(runs, progress, [&](std::size_t run) {
+    forAllPolled(runs, progress, [&](std::size_t run) {
         const std::size_t first = begin + run * CurveCells::capacity,
                           count = std::min(CurveCells::capacity, keys.size() - first);
         makeKeys(parts, size, first, count, keys.data() + first, found.local());
@@ -159,16 +153,16 @@ std::vector<std::uint64_t> keysOf(TriangleParts& parts, const glm::ivec3& size, 
 // Sorts the keys by recursive splitting instead of Hilbert order.
 void split(const TriangleParts& parts, std::vector<std::uint64_t>& keys, Progress* progress) {
     auto items = vectorOf<TreeItem>(keys.size(), progress);
-    forAll(keys.size(), progress, [&](std::size_t i) {
+    forAllPolled(keys.size(), progress, [&](std::size_t i) {
         const TriangleCorners c = parts.corners(std::size_t(keys[i] & curveIndexMask));
         items[i] = {glm::vec3(c[0] + c[1] + c[2]), std::uint32_t(keys[i] & curveIndexMask)};
     });
     sortBySplitting(items, progress);
-    forAll(keys.size(), progress, [&](std::size_t i) { keys[i] = items[i].index; });
+    forAllPolled(keys.size(), progress, [&](std::size_t i) { keys[i] = items[i].index; });
 }
 
 // Returns a unit vector perpendicular to `direction`.
-glm::dvec3 across(const glm::dvec3& direction) {
+glm::dvec3 perpendicularTo(const glm::dvec3& direction) {
     const glm::dvec3 a = glm::abs(direction);
     const glm::dvec3 smallest(a.x <= a.y && a.x <= a.z, a.y < a.x && a.y <= a.z, a.z < a.x && a.z < a.y);
     return glm::normalize(glm::cross(direction, smallest));
@@ -191,7 +185,8 @@ void writeTriangle(WideLeaf& leaf, std::size_t place, const TriangleCorners& cor
     const glm::dvec3 x = unitOr(b - a, glm::dvec3(1, 0, 0));
     const glm::dvec3 normal = unitOr(glm::cross(b - a, c - a), glm::dvec3(0)),
                      upright = normal - glm::dot(normal, x) * x;
-    const glm::dvec3 z = glm::dot(upright, upright) > 0.25 ? glm::normalize(upright) : across(x), y = glm::cross(z, x);
+    const glm::dvec3 z = glm::dot(upright, upright) > 0.25 ? glm::normalize(upright) : perpendicularTo(x),
+                     y = glm::cross(z, x);
     const glm::dvec2 flatB(glm::dot(b - a, x), 0), flatC(glm::dot(c - a, x), glm::dot(c - a, y));
     const glm::dvec2 bc = unitOr(flatC - flatB, glm::dvec2(1, 0)), ac = unitOr(flatC, glm::dvec2(1, 0));
     const glm::dvec3 cell = glm::floor(a);
@@ -258,7 +253,7 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, con
         sortCurveKeys(keys, progress);
     tree.makeRoom((keys.size() + treeWidth - 1) / treeWidth);
     tree.leaves = LargeArray<WideLeaf>(tree.leafCount);
-    forAll(tree.leafCount, progress, [&](std::size_t i) { makeLeaf(parts, keys, i, tree); });
+    forAllPolled(tree.leafCount, progress, [&](std::size_t i) { makeLeaf(parts, keys, i, tree); });
     tree.joinBoxes(progress);
     return tree;
 }

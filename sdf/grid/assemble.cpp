@@ -214,7 +214,7 @@ void Assembler::take(const FilledBlocks& blocks) {
     BandMasks masks;
     for (std::size_t b = 0; b < blocks.origins.size(); ++b) {
         const glm::ivec3 o = blocks.origins[b];
-        auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), openvdb::Coord(o.x, o.y, o.z));
+        auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), coordOf(o));
         leaf->buffer().allocate();
         if (!trimToBand(blocks.distances.data() + b * blockVoxels, widths_, leaf->buffer().data(), masks)) continue;
         const bool plain = isPlain(masks);

@@ -22,7 +22,7 @@ namespace bilayer::detail {
 namespace {
 
 /// Exceeds what binning and clustering add to the reach for rounding [voxels].
-constexpr double reachSlack = 2;
+constexpr double roundingSlack = 2;
 /// A triangle whose box spans more cells than this is tested against each cell.
 constexpr int cellsWorthCulling = 8;
 constexpr std::size_t trianglesPerTask = 1024;
@@ -37,10 +37,6 @@ bool sameCorners(const Mesh& a, const Mesh& b, std::size_t triangle) {
 
 glm::ivec3 floorToInt(const glm::dvec3& v) {
     return {int(std::floor(v.x)), int(std::floor(v.y)), int(std::floor(v.z))};
-}
-
-openvdb::Coord coord(const glm::ivec3& v) {
-    return {v.x, v.y, v.z};
 }
 
 // Visits all integer points of a box, including both ends.
@@ -85,7 +81,7 @@ DirtyRegion::DirtyRegion(const Mesh& before, const Mesh& after, std::span<const 
         openvdb::tree::ValueAccessor<openvdb::MaskTree> cells(parts.local());
         for (std::size_t i = range.begin(); i < range.end(); ++i)
             for (const Mesh* mesh : {&before, &after})
-                add(*mesh, mesh->triangles[moved[i]], voxelsPerUnit, double(reach) + reachSlack, cells);
+                add(*mesh, mesh->triangles[moved[i]], voxelsPerUnit, double(reach) + roundingSlack, cells);
     });
     for (const openvdb::MaskTree& part : parts) cells_.topologyUnion(part);
 }
@@ -104,14 +100,14 @@ void DirtyRegion::add(const Mesh& mesh, const glm::uvec3& triangle, double voxel
     forEachIn(lower, upper, [&](const glm::ivec3& cell) {
         // the plane of the triangle is too far from the cell
         if (large && std::abs(glm::dot(normal, glm::dvec3(cell * (1 << shift_)) + half - a)) > room) return;
-        cells.setValueOn(coord(cell));
+        cells.setValueOn(coordOf(cell));
     });
 }
 
 bool DirtyRegion::any(const glm::ivec3& first, int side) const {
     const glm::ivec3 lower = first >> shift_, upper = (first + (side - 1)) >> shift_;
     bool found = false;
-    forEachIn(lower, upper, [&](const glm::ivec3& cell) { found = found || cells_.isValueOn(coord(cell)); });
+    forEachIn(lower, upper, [&](const glm::ivec3& cell) { found = found || cells_.isValueOn(coordOf(cell)); });
     return found;
 }
 

@@ -14,10 +14,6 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree>;
 constexpr int leafLevel = 1;  // of tiles as large as a leaf
 
-openvdb::Coord coord(const glm::ivec3& v) {
-    return {v.x, v.y, v.z};
-}
-
 BlockBox filledWithin(const FieldPart& part) {
     return part.filled().within(part.lattice);
 }
@@ -45,7 +41,7 @@ class BoxFlood {
                 at.z = box.first.z;
                 bool z = y;
                 for (; at.z < box.end.z; at.z += blockSide) {
-                    z = fill(coord(at), z);
+                    z = fill(coordOf(at), z);
                     if (at.z == box.first.z) y = z;
                 }
                 if (at.y == box.first.y) x = y;

@@ -45,7 +45,7 @@ struct PlacedNode {
     glm::dmat4 world;
 };
 
-glm::dmat4 columns(const aiMatrix4x4& m) {
+glm::dmat4 matrixOf(const aiMatrix4x4& m) {
     return {{m.a1, m.b1, m.c1, m.d1}, {m.a2, m.b2, m.c2, m.d2}, {m.a3, m.b3, m.c3, m.d3}, {m.a4, m.b4, m.c4, m.d4}};
 }
 
@@ -77,7 +77,7 @@ class AssimpScene {
             open.pop_back();
             ++nodes_;
             shown_ += node->mNumMeshes;
-            const glm::dmat4 world = parent * columns(node->mTransformation);
+            const glm::dmat4 world = parent * matrixOf(node->mTransformation);
             for (unsigned i = 0; i < node->mNumMeshes; ++i) add(part(node->mMeshes[i]), world);
             for (unsigned i = node->mNumChildren; i > 0; --i) open.push_back({node->mChildren[i - 1], world});
         }

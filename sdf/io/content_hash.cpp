@@ -15,13 +15,13 @@ constexpr std::uint64_t fnvStart = 0xcbf29ce484222325u, fnvPrime = 0x100000001b3
 constexpr std::size_t partOfFile = 1 << 26;  // that is in memory at once [bytes]
 
 // Spreads the last words over all bits, so that a remainder of the hash is evenly distributed.
-std::uint64_t spread(std::uint64_t hash) {
+std::uint64_t spreadBits(std::uint64_t hash) {
     constexpr std::uint64_t oddFactor = 0x9e3779b97f4a7c15u;  // 2^64 / golden ratio
     hash = (hash ^ (hash >> 29)) * oddFactor;
     return hash ^ (hash >> 32);
 }
 
-std::string digits(std::uint64_t hash) {
+std::string hexDigits(std::uint64_t hash) {
     return fmt::format("{:016x}", hash);
 }
 
@@ -42,17 +42,17 @@ std::uint64_t contentHash(std::string_view bytes) {
         hash = mixedHash(hash, word);
         bytes.remove_prefix(count);
     }
-    return spread(hash);
+    return spreadBits(hash);
 }
 
 std::string fileHash(const std::filesystem::path& path) {
     const MappedFile file(path, MappedFile::Paging::onDemand);
     std::string hashes = std::to_string(file.bytes().size());
     for (std::size_t at = 0; at < file.bytes().size(); at += partOfFile) {
-        hashes += digits(contentHash(file.bytes().substr(at, partOfFile)));
+        hashes += hexDigits(contentHash(file.bytes().substr(at, partOfFile)));
         file.release();
     }
-    return digits(contentHash(hashes));
+    return hexDigits(contentHash(hashes));
 }
 
 }  // namespace bilayer::detail

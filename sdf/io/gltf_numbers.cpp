@@ -64,7 +64,7 @@ std::size_t componentsOf(int type) {
     return std::size_t(tinygltf::GetNumComponentsInType(std::uint32_t(type)));
 }
 
-const char* nameOf(int type) {
+const char* typeName(int type) {
     switch (type) {
         case TINYGLTF_TYPE_SCALAR:
             return "SCALAR";
@@ -88,8 +88,8 @@ const tinygltf::Accessor& GltfNumbers::accessor(int index, int type, const std::
     require(index >= 0 && std::size_t(index) < count, "{} is accessor {}, but the file has {} accessors", use, index,
             count);
     const tinygltf::Accessor& found = model_.accessors[std::size_t(index)];
-    require(found.type == type, "accessor {}, used as {}, is of type {}; it must be {}", index, use, nameOf(found.type),
-            nameOf(type));
+    require(found.type == type, "accessor {}, used as {}, is of type {}; it must be {}", index, use,
+            typeName(found.type), typeName(type));
     require(isNumberType(found.componentType),
             "accessor {}, used as {}, has componentType {}; it must be 5120 to 5123, 5125 or 5126", index, use,
             found.componentType);

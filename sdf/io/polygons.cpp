@@ -27,16 +27,16 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t grain = 1 << 14;  // vertices or faces per task
-constexpr double maxRounding = 1e-6;    // of coordinates, relative to the size of the mesh
+constexpr std::size_t itemsPerTask = 1 << 14;  // vertices or faces per task
+constexpr double maxRounding = 1e-6;           // of coordinates, relative to the size of the mesh
 
 using IndexRange = tbb::blocked_range<std::size_t>;
 
 /// Throws if a corner refers to a vertex that does not exist.
 void requireVertices(const std::vector<unsigned>& corners, std::size_t vertices) {
-    inOrder((corners.size() + grain - 1) / grain, [&](std::size_t part) {
-        const std::size_t end = std::min((part + 1) * grain, corners.size());
-        for (std::size_t i = part * grain; i < end; ++i)
+    inOrder((corners.size() + itemsPerTask - 1) / itemsPerTask, [&](std::size_t part) {
+        const std::size_t end = std::min((part + 1) * itemsPerTask, corners.size());
+        for (std::size_t i = part * itemsPerTask; i < end; ++i)
             if (corners[i] >= vertices)
                 throw std::runtime_error(
                     fmt::format("a face refers to vertex {}, but there are {}, counted from 0", corners[i], vertices));
@@ -52,7 +52,7 @@ struct VertexBounds {
 template <class Scalar>
 VertexBounds boundsOf(const std::vector<glm::vec<3, Scalar>>& points, const std::vector<std::uint8_t>& used) {
     return tbb::parallel_reduce(
-        IndexRange(0, points.size(), grain), VertexBounds{},
+        IndexRange(0, points.size(), itemsPerTask), VertexBounds{},
         [&](const IndexRange& range, VertexBounds bounds) {
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 if (!used[i]) continue;
@@ -83,7 +83,7 @@ std::vector<glm::vec3> relativeTo(const glm::dvec3& origin, std::vector<glm::vec
         if (origin == glm::dvec3(0)) return points;
     std::vector<glm::vec3> moved;
     resizeLarge(moved, points.size());
-    tbb::parallel_for(IndexRange(0, points.size(), grain), [&](const IndexRange& range) {
+    tbb::parallel_for(IndexRange(0, points.size(), itemsPerTask), [&](const IndexRange& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) moved[i] = glm::vec3(glm::dvec3(points[i]) - origin);
     });
     return moved;
@@ -122,7 +122,7 @@ class FaceTriangulator {
         begins_.reserve(parts() + 1);
         std::size_t corner = 0;
         for (std::size_t face = 0; face < polygons.sizes.size(); corner += polygons.sizes[face++])
-            if (face % grain == 0) begins_.push_back(corner);
+            if (face % itemsPerTask == 0) begins_.push_back(corner);
     }
 
     std::vector<glm::uvec3> run(std::vector<std::string>& notes) const {
@@ -150,14 +150,14 @@ class FaceTriangulator {
     }
 
   private:
-    std::size_t parts() const { return (polygons_.sizes.size() + grain - 1) / grain; }
+    std::size_t parts() const { return (polygons_.sizes.size() + itemsPerTask - 1) / itemsPerTask; }
 
     FaceTriangles triangulatePart(std::size_t part) const {
         FaceTriangles result;
         std::size_t corner = begins_[part];
         std::vector<glm::dvec3> outline;
-        const std::size_t end = std::min((part + 1) * grain, polygons_.sizes.size());
-        for (std::size_t face = part * grain; face < end; corner += polygons_.sizes[face++]) {
+        const std::size_t end = std::min((part + 1) * itemsPerTask, polygons_.sizes.size());
+        for (std::size_t face = part * itemsPerTask; face < end; corner += polygons_.sizes[face++]) {
             const unsigned* corners = &polygons_.corners[corner];
             if (polygons_.sizes[face] == 3) {
                 result.triangles.push_back({corners[0], corners[1], corners[2]});
@@ -183,7 +183,7 @@ class FaceTriangulator {
 
 std::vector<glm::uvec3> asTriangles(const std::vector<unsigned>& corners) {
     std::vector<glm::uvec3> triangles(corners.size() / 3);
-    tbb::parallel_for(IndexRange(0, triangles.size(), grain), [&](const IndexRange& range) {
+    tbb::parallel_for(IndexRange(0, triangles.size(), itemsPerTask), [&](const IndexRange& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i)
             triangles[i] = {corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]};
     });

@@ -23,15 +23,15 @@ constexpr float coveringRadius = 3;
 /// Margin of the sample reach against rounding [voxels].
 constexpr float reachSlack = 1e-3f;
 
-void require(bool condition, const char* option, const char* range, double value) {
+void requireOption(bool condition, const char* option, const char* range, double value) {
     if (!condition) throw std::invalid_argument(fmt::format("{} must be {}, not {}", option, range, value));
 }
 
 void checkWidth(const char* option, float voxels, float voxelSize) {
-    require(voxels > 0 && voxels <= maxWidthVoxels, option, "in (0, 1000] voxels", voxels);
+    requireOption(voxels > 0 && voxels <= maxWidthVoxels, option, "in (0, 1000] voxels", voxels);
     // Background of the field [m].
     const float width = voxels * voxelSize;
-    require(std::isnormal(width), option, "a width that floats can hold", width);
+    requireOption(std::isnormal(width), option, "a width that floats can hold", width);
 }
 
 }  // namespace
@@ -60,17 +60,17 @@ void checkOptions(const BuildOptions& options) {
         return value >= low && value <= high;
     };
     const DoubleLayerOptions& layers = options.doubleLayer;
-    require(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length",
-            options.voxelSize);
+    requireOption(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length",
+                  options.voxelSize);
     checkVoxelSize(options.voxelSize);
     checkWidth("exteriorWidthVoxels", options.exteriorWidthVoxels, options.voxelSize);
     checkWidth("interiorWidthVoxels", options.interiorWidthVoxels, options.voxelSize);
-    require(within(options.gapVoxels, 0, 100), "gapVoxels", "in 0..100", options.gapVoxels);
-    require(layers.delta >= minDelta && layers.delta <= 4, "delta", "in [0.1, 4] voxels", layers.delta);
-    require(within(layers.epsilon, 1e-4f, 1e4f), "epsilon", "in 1e-4..1e4 square voxels", layers.epsilon);
-    require(within(layers.neighbourhood, 1, 64), "neighbourhood", "in 1..64", layers.neighbourhood);
-    require(within(layers.maxSubdivision, 1, 1024), "maxSubdivision", "in 1..1024", layers.maxSubdivision);
-    require(within(options.threads, 0, 4096), "threads", "in 0..4096", options.threads);
+    requireOption(within(options.gapVoxels, 0, 100), "gapVoxels", "in 0..100", options.gapVoxels);
+    requireOption(layers.delta >= minDelta && layers.delta <= 4, "delta", "in [0.1, 4] voxels", layers.delta);
+    requireOption(within(layers.epsilon, 1e-4f, 1e4f), "epsilon", "in 1e-4..1e4 square voxels", layers.epsilon);
+    requireOption(within(layers.neighbourhood, 1, 64), "neighbourhood", "in 1..64", layers.neighbourhood);
+    requireOption(within(layers.maxSubdivision, 1, 1024), "maxSubdivision", "in 1..1024", layers.maxSubdivision);
+    requireOption(within(options.threads, 0, 4096), "threads", "in 0..4096", options.threads);
     if (options.unite && (hasOwnSigns(options.method) || options.sign == Sign::flood))
         throw std::invalid_argument(
             "unite needs the method exact or pseudonormal and a sign by normals or winding numbers");

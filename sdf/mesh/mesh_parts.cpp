@@ -20,7 +20,7 @@ namespace bilayer::detail {
 namespace {
 
 /// Surfaces closer than this count as touching, relative to the max coordinate: far above the rounding of doubles.
-constexpr double touching = 1e-12;
+constexpr double touchingDistance = 1e-12;
 
 // Returns whether two triangles are more than `slack` apart along a direction of any length.
 bool separatedAlong(const glm::dvec3& axis, const TriangleCorners& a, const TriangleCorners& b, double slack) {
@@ -78,7 +78,7 @@ MeshParts::MeshParts(const Mesh& mesh, std::span<const unsigned> partOf, std::si
     for (const Bounds& box : boxes_)
         for (int k = 0; k < 3 && !box.empty(); ++k)
             largest = std::max({largest, std::abs(double(box.lower[k])), std::abs(double(box.upper[k]))});
-    slack_ = touching * largest;
+    slack_ = touchingDistance * largest;
     findSeparating(progress);
 }
 

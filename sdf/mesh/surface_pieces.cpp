@@ -23,7 +23,7 @@ double largestCoordinate(const Mesh& mesh) {
 }
 
 template <class Work>
-void forAll(std::size_t count, Progress* progress, const Work& work) {
+void forEachPolled(std::size_t count, Progress* progress, const Work& work) {
     tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
         poll(progress);
         work(i);
@@ -42,7 +42,7 @@ SurfacePieces::SurfacePieces(const Mesh& mesh, double slack, Progress* progress)
       patchLabels_(mesh.triangles.size(), 0),
       cuts_(mesh.triangles.size()) {
     const TriangleContacts contacts(mesh, topology_, tree_, slack_);
-    forAll(contacts_.size(), progress, [&](std::size_t i) { contacts_[i] = contacts.within(unsigned(i)); });
+    forEachPolled(contacts_.size(), progress, [&](std::size_t i) { contacts_[i] = contacts.within(unsigned(i)); });
     touched_ = std::any_of(contacts_.begin(), contacts_.end(), [](const auto& segments) { return !segments.empty(); });
     findPatches();
 }
@@ -83,11 +83,11 @@ void SurfacePieces::label(const LabelOf& labelOf) {
     const auto labelAt = [&](const glm::dvec3& place, const glm::dvec3& normal) {
         return labelOf(sides.at(place, slack_ * normal));
     };
-    forAll(patches_.size(), progress_, [&](std::size_t p) {
+    forEachPolled(patches_.size(), progress_, [&](std::size_t p) {
         const DoubleTriangle largest = face(patches_[p]);
         patchLabels_[patches_[p]] = largest.area > 0 ? labelAt(largest.centroid(), largest.normal) : withoutArea;
     });
-    forAll(contacts_.size(), progress_, [&](std::size_t i) {
+    forEachPolled(contacts_.size(), progress_, [&](std::size_t i) {
         if (contacts_[i].empty()) return;
         const DoubleTriangle triangle = face(i);
         cuts_[i] = cut(triangle.polygon(), triangle.normal, contacts_[i], slack_,

@@ -16,10 +16,10 @@ namespace bilayer::detail {
 namespace {
 
 /// Vertices, triangles or half-edges per task.
-constexpr std::size_t grain = 4096;
+constexpr std::size_t edgesPerTask = 4096;
 
 // Mixes every bit of a word into all others: the finalizer of S. Vigna's and G. Steele's SplitMix64.
-std::uint64_t mixed(std::uint64_t word) {
+std::uint64_t mixedBits(std::uint64_t word) {
     word = (word ^ (word >> 30)) * 0xbf58476d1ce4e5b9u;
     word = (word ^ (word >> 27)) * 0x94d049bb133111ebu;
     return word ^ (word >> 31);
@@ -35,7 +35,7 @@ std::uint64_t bitsOf(float coordinate) {
 LargeArray<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) {
     std::vector<unsigned> ends(vertices + 1, 0);
     const auto forEachUse = [&](auto visit) {
-        forAllPolled(topology.triangles.size(), grain, topology.progress, [&](std::size_t i) {
+        forAllPolled(topology.triangles.size(), topology.progress, [&](std::size_t i) {
             if (!topology.proper(i)) return;
             for (int k = 0; k < 3; ++k) {
                 const unsigned a = topology.triangles[i][k], b = topology.triangles[i][(k + 1) % 3];
@@ -51,7 +51,7 @@ LargeArray<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) 
     LargeArray<EdgeUse> edges(ends.back());
     // advances each bucket from its begin to its end
     forEachUse([&](const EdgeUse& use) { edges[increment(ends[use.low])] = use; });
-    forAllPolled(vertices, grain, topology.progress, [&](std::size_t v) {
+    forAllPolled(vertices, topology.progress, [&](std::size_t v) {
         std::sort(edges.data() + (v ? ends[v - 1] : 0), edges.data() + ends[v], [](const EdgeUse& a, const EdgeUse& b) {
             return a.high != b.high ? a.high < b.high : a.triangle < b.triangle;
         });
@@ -68,7 +68,7 @@ std::vector<unsigned> originals(const Topology& topology) {
         const glm::uvec3& t = topology.triangles[use.triangle];
         return t.x ^ t.y ^ t.z ^ use.low ^ use.high;
     };
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, topology.edges.size(), grain), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, topology.edges.size(), edgesPerTask), [&](const auto& range) {
         poll(topology.progress);
         std::vector<std::pair<unsigned, unsigned>> all;  // opposite vertices, triangles
         topology.forEdges(range.begin(), range.end(), [&](std::span<const EdgeUse> uses) {
@@ -94,7 +94,7 @@ Topology Topology::ofWelded(const Mesh& mesh, Progress* progress) {
 
 Topology::Topology(const Mesh& mesh, const LargeArray<unsigned>& first, Progress* asked)
     : triangles(vectorOf<glm::uvec3>(mesh.triangles.size(), asked)), progress(asked) {
-    forAllPolled(triangles.size(), grain, progress, [&](std::size_t i) {
+    forAllPolled(triangles.size(), progress, [&](std::size_t i) {
         const glm::uvec3& t = mesh.triangles[i];
         triangles[i] = first.size() ? glm::uvec3(first[t.x], first[t.y], first[t.z]) : t;
     });
@@ -108,12 +108,12 @@ bool Topology::proper(std::size_t triangle) const {
 }
 
 ConcurrentDisjointSets::ConcurrentDisjointSets(std::size_t n) : parent_(n) {
-    forAllPolled(n, grain, nullptr, [&](std::size_t i) { parent_[i] = unsigned(i); });
+    forAllPolled(n, nullptr, [&](std::size_t i) { parent_[i] = unsigned(i); });
 }
 
 ConcurrentDisjointSets connectedVertices(const Mesh& mesh) {
     ConcurrentDisjointSets sets(mesh.points.size());
-    forAllPolled(mesh.triangles.size(), grain, nullptr, [&](std::size_t i) {
+    forAllPolled(mesh.triangles.size(), nullptr, [&](std::size_t i) {
         const glm::uvec3& t = mesh.triangles[i];
         sets.join(t.x, t.y);
         sets.join(t.x, t.z);
@@ -122,12 +122,12 @@ ConcurrentDisjointSets connectedVertices(const Mesh& mesh) {
 }
 
 std::uint64_t hashVertex(const glm::vec3& p) {
-    return mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
+    return mixedBits(mixedBits(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
 }
 
 std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress) {
     auto hashes = vectorOf<std::uint64_t>(mesh.points.size(), progress);
-    forAllPolled(hashes.size(), grain, progress, [&](std::size_t i) { hashes[i] = hashVertex(mesh.points[i]); });
+    forAllPolled(hashes.size(), progress, [&](std::size_t i) { hashes[i] = hashVertex(mesh.points[i]); });
     return hashes;
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 /// Surfaces closer than this count as touching, relative to the max coordinate. Rounding to floats moves two flush
 /// surfaces apart by at most sqrt(3) units in the last place, 2.1e-7. The walls between them are removed.
-constexpr double touching = 2.5e-7;
+constexpr double flushDistance = 2.5e-7;
 /// The same where surfaces lie exactly where their floats say: above the rounding of doubles.
 constexpr double coincident = 2e-12;
 
@@ -19,7 +19,7 @@ constexpr double coincident = 2e-12;
 
 UnionSurface unite(const Mesh& mesh, Progress* progress) {
     validate(mesh);
-    SurfacePieces pieces(mesh, touching, progress);
+    SurfacePieces pieces(mesh, flushDistance, progress);
     if (pieces.isSinglePatch()) return {mesh, 0, 0};
     pieces.label([](const SideNumbers& sides) { return sides.front > 0 && sides.behind > 0 ? 0 : 1; });
     UnionSurface united{pieces.labelled().mesh, 0, 0};

@@ -20,7 +20,7 @@ namespace bilayer::detail {
 namespace {
 
 /// Voxels closer than this are on the surface and belong to neither side [voxels].
-constexpr float onSurface = 1e-4f;
+constexpr float floodSurface = 1e-4f;
 constexpr std::uint32_t infinity = 0;  // the part that contains all space beyond the cells
 
 // Returns the connected components of a mask.
@@ -114,7 +114,7 @@ void Flood::run() {
     // The remaining voxels are very close to the surface, so the triangles themselves are tested.
     for (CellState& state : states_) state.fresh = state.known;
     const auto clear = [this](std::size_t cell, unsigned voxel, const openvdb::Coord& link, float a, float b) {
-        if (!(std::min(a, b) > onSurface * float(h_))) return false;
+        if (!(std::min(a, b) > floodSurface * float(h_))) return false;
         poll(progress_);
         const openvdb::Coord at = cells_.all()[cell].leaf->offsetToGlobalCoord(voxel), to = at + link;
         return !winding_.meets(glm::dvec3(at.x(), at.y(), at.z()) * h_, glm::dvec3(to.x(), to.y(), to.z()) * h_);
@@ -265,7 +265,7 @@ void Flood::stepIn(std::size_t cell, const Passes& passes) {
 void Flood::settleRest() {
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
         if (!cells_.all()[c].leaf) return;
-        const BlockMask off = farther(*cells_.all()[c].leaf, onSurface * float(h_));
+        const BlockMask off = farther(*cells_.all()[c].leaf, floodSurface * float(h_));
         for (std::size_t x = 0; x < blockSide; ++x) states_[c].inside[x] |= off[x] & ~states_[c].known[x];
     });
 }

@@ -17,7 +17,7 @@ namespace bilayer::detail {
 namespace {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
-constexpr int side = int(Leaf::DIM);
+constexpr int leafSide = int(Leaf::DIM);
 
 /// Voxels closer to the surface than this may have either sign [voxels].
 constexpr float onSurface = 1e-3f;
@@ -42,19 +42,20 @@ class TileRepair {
             const auto column = std::size_t(std::countr_zero(rest));
             const std::int32_t below = numbers_.below(column);
             const auto repairOne = [&](int k, std::int32_t winding) {
-                repairVoxel(leaf, unsigned(column) * side + unsigned(k), winding, sum);
+                repairVoxel(leaf, unsigned(column) * leafSide + unsigned(k), winding, sum);
             };
             if (crossed >> column & 1)
                 numbers_.climb(column, repairOne);
-            else if (!allAre(below > 0, leaf.buffer().data() + column * side))
-                for (int k = 0; k < side; ++k) repairOne(k, below);
+            else if (!allAre(below > 0, leaf.buffer().data() + column * leafSide))
+                for (int k = 0; k < leafSide; ++k) repairOne(k, below);
         }
     }
 
   private:
     static bool allAre(bool inside, const float* values) {
         std::uint32_t differ = 0;
-        for (int k = 0; k < side; ++k) differ |= std::bit_cast<std::uint32_t>(values[k]) ^ (inside ? 0x80000000u : 0u);
+        for (int k = 0; k < leafSide; ++k)
+            differ |= std::bit_cast<std::uint32_t>(values[k]) ^ (inside ? 0x80000000u : 0u);
         return differ >> 31 == 0;
     }
 

@@ -15,7 +15,7 @@ constexpr double propagatedError = 0.5;
 /// Offset of the query point for a voxel away from the surface, in a closed mesh [voxels]. Without it, query points
 /// often lie on cancelling walls inside a union. It is shorter than the free half voxel, and not along a simple plane.
 const glm::dvec3 offWalls(0.113, 0.071, 0.167);
-const double halfDiagonal = std::sqrt(3.0) / 2;  // of a cube with side 1
+const double unitHalfDiagonal = std::sqrt(3.0) / 2;  // of a cube with side 1
 
 }  // namespace
 
@@ -31,11 +31,11 @@ WindingSide WindingQuery::around(const glm::dvec3& point) const {
 }
 
 double WindingQuery::slopeIn(const glm::dvec3& centre, std::int32_t side) const {
-    return slope ? (*slope)(centre, halfDiagonal * side * voxelSize) * voxelSize : 0;
+    return slope ? (*slope)(centre, unitHalfDiagonal * side * voxelSize) * voxelSize : 0;
 }
 
 double WindingQuery::changeInCube(std::int32_t side, double slope) {
-    return halfDiagonal * side * slope;
+    return unitHalfDiagonal * side * slope;
 }
 
 }  // namespace bilayer::detail

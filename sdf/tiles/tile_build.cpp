@@ -20,11 +20,11 @@ namespace {
 /// Memory of a process that holds no tile: the program, its libraries, and the counters of all bricks [bytes].
 constexpr double bytesOfProcess = 160e6;
 /// Memory per triangle: as read, as a mesh, in bins, and in the cells of bricks [bytes].
-constexpr double bytesPerTriangle = 240;
+constexpr double tileBytesPerTriangle = 240;
 /// Memory per column of voxels: the tile's own sum, the one below, and one of another tile [bytes].
 constexpr double bytesPerColumn = 12;
 /// Memory per block: a leaf, its place in the tree, its compressed form, and the bytes of the file [bytes].
-constexpr double bytesPerBlock = 5000;
+constexpr double tileBytesPerBlock = 5000;
 
 Mesh meshOf(std::span<const TileTriangle> triangles, const glm::dvec3& origin) {
     Mesh mesh;
@@ -66,8 +66,8 @@ double tileBytes(std::uint64_t triangles, double area, const Tiling& tiling, std
     const TriangleLimits limits = tiling.limits(tile);
     const glm::dvec3 side = limits.upper - limits.lower;
     const double blocks = std::min(side.x * side.y * side.z / blockVoxels, blocksAround(area, double(tiling.reach())));
-    return bytesOfProcess + side.x * side.y * bytesPerColumn + double(triangles) * bytesPerTriangle +
-           blocks * bytesPerBlock * (options.triangles ? 2 : 1);
+    return bytesOfProcess + side.x * side.y * bytesPerColumn + double(triangles) * tileBytesPerTriangle +
+           blocks * tileBytesPerBlock * (options.triangles ? 2 : 1);
 }
 
 }  // namespace bilayer::detail

@@ -13,7 +13,7 @@
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::dense_test {
 using namespace bilayer::paper;
 
 namespace {
@@ -169,3 +169,4 @@ TEST_CASE("pseudonormals of an open mesh are refused") {
     const auto [mesh, lattice] = inLattice({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}, 30);
     CHECK_THROWS_AS(scatterPseudonormal(mesh, lattice, 2), std::invalid_argument);
 }
+}  // namespace bilayer::dense_test

@@ -9,7 +9,7 @@
 
 #include "demos/shared/shapes.h"
 
-using namespace bilayer;
+namespace bilayer::measure_test {
 using namespace bilayer::bench;
 
 TEST_CASE("medians, geometric means and slopes") {
@@ -72,3 +72,4 @@ TEST_CASE("fields differ where their meshes do") {
     CHECK(shifted.signs > 100);
     CHECK(shifted.voxels > 100);
 }
+}  // namespace bilayer::measure_test

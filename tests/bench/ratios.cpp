@@ -9,7 +9,7 @@
 
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::ratios_test {
 using bench::Ratios;
 
 TEST_CASE("ratios are those of the rounds that both builders have") {
@@ -36,3 +36,4 @@ TEST_CASE("ratios are written only where they are asked for, and a file that can
     app.parse("--ratios /dev/full");
     CHECK_THROWS_WITH(ratios.write(), "cannot write /dev/full");
 }
+}  // namespace bilayer::ratios_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::theorems_test {
 using namespace bilayer::paper;
 
 namespace {
@@ -61,3 +61,4 @@ TEST_CASE("theorem 2: OF is no more than half of what the edges' halves differ b
     CHECK(closed.farthest <= 1 + none);
     CHECK(open.farthest > 1);  // F is the farthest point only where Fig. 6 draws a triangle
 }
+}  // namespace bilayer::theorems_test

@@ -15,7 +15,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::body_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 using bullet::Shape;
@@ -90,3 +90,4 @@ TEST_CASE("A shape's own margin goes before that of its body") {
     const Pair slab = bodyOf(shapes::box({1, 1, 0.1f}, 4), 0.04f);
     CHECK(Shape(slab.loaded, {.margin = 0.01f}).getMargin() == 0.01f);
 }
+}  // namespace bilayer::body_test

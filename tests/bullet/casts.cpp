@@ -18,7 +18,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::casts_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -250,3 +250,4 @@ TEST_CASE("Fast bodies that Bullet follows itself stop at a field as at its tria
     CHECK(lowest > 0.1f);
     CHECK(last == Approx(expectedLast).margin(0.1 * voxel + stopsBefore));
 }
+}  // namespace bilayer::casts_test

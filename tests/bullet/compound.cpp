@@ -8,7 +8,7 @@
 
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::compound_test {
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -194,3 +194,4 @@ TEST_CASE("A compound's children are collided in one batch with all other pairs"
     world.run(1 / 240.f);
     CHECK(world.dispatcher.statistics().pairs < 60);
 }
+}  // namespace bilayer::compound_test

@@ -15,7 +15,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::continuous_collision_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -397,3 +397,4 @@ TEST_CASE("Sliding, rolling and resting bodies are not stopped, and a world with
     for (int i = 0; i < 2; ++i) fast.dynamics.stepSimulation(step, 0);
     CHECK(body->getCenterOfMassPosition().z() > 0.19f);
 }
+}  // namespace bilayer::continuous_collision_test

@@ -19,7 +19,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::convex_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -215,3 +215,4 @@ TEST_CASE("A basis that scales gives the pose of a unit quaternion") {
         CHECK(glm::length(scaled.rotation) == Approx(1).epsilon(1e-3));
     }
 }
+}  // namespace bilayer::convex_test

@@ -14,7 +14,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::convex_distances_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -120,3 +120,4 @@ TEST_CASE("Contact tests between a field and convex shapes return the distance t
     }
     CHECK(found > 0);
 }
+}  // namespace bilayer::convex_distances_test

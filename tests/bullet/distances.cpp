@@ -20,7 +20,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::distances_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -279,3 +279,4 @@ TEST_CASE("Contact tests return the distance of round bodies that nearly touch e
               Approx(gap + 0.0013f * radius).margin(0.003 * double(radius) + 0.005 * double(voxel)));
     }
 }
+}  // namespace bilayer::distances_test

@@ -12,7 +12,7 @@
 #include "demos/shared/shapes.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::draw_test {
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -125,3 +125,4 @@ TEST_CASE("A band is outlined by the blocks that it lies in") {
     bullet::drawFields(world.dynamics, points, {.band = false, .points = true});
     CHECK(points.lines == static_cast<int>(shape.collider().data().points().points().size()));
 }
+}  // namespace bilayer::draw_test

@@ -14,7 +14,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::drops_test {
 using namespace bilayer::test;
 
 namespace {
@@ -82,3 +82,4 @@ TEST_CASE("dirty meshes that are usable as bodies gain no energy on any ground")
         }
     }
 }
+}  // namespace bilayer::drops_test

@@ -21,7 +21,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::edges_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -359,3 +359,4 @@ TEST_CASE("Exact contacts are exact against Bullet's shapes too") {
     }
     CHECK(worstSampled > 0.1f * h);
 }
+}  // namespace bilayer::edges_test

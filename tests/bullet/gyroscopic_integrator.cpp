@@ -11,7 +11,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::gyroscopic_integrator_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -136,3 +136,4 @@ TEST_CASE("Tick callbacks of the user's are called with the extensions, set befo
     CHECK(ticks.before == 241);
     CHECK(ticks.after == 241);
 }
+}  // namespace bilayer::gyroscopic_integrator_test

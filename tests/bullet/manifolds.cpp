@@ -9,7 +9,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::manifolds_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -211,3 +211,4 @@ TEST_CASE("Global callbacks stay set while contacts are made on several threads"
     CHECK(asked > 0);
     CHECK(missing == 0);
 }
+}  // namespace bilayer::manifolds_test

@@ -17,7 +17,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::motion_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -251,3 +251,4 @@ TEST_CASE("Bodies that fall flat without friction do not drift sideways") {
             CHECK(std::hypot(at.x() - place.x(), at.y() - place.y()) < 1e-3f);
         }
 }
+}  // namespace bilayer::motion_test

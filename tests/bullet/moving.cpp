@@ -15,7 +15,7 @@
 #include "integration/bullet/detail/convert.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::moving_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -201,3 +201,4 @@ TEST_CASE("Continuous collision passes over soft bodies, which are no shapes of 
     for (int i = 0; i < 4; ++i) world.dynamics.stepSimulation(step, 1, step);
     CHECK(world.body->getWorldTransform().getOrigin().z() < 0);
 }
+}  // namespace bilayer::moving_test

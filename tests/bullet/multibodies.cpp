@@ -13,7 +13,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::multibodies_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -129,3 +129,4 @@ TEST_CASE("A link does not pass through a thin plate if Bullet's bounding boxes 
     world.removeMultiBody(&robot.body);
     world.removeRigidBody(&still);
 }
+}  // namespace bilayer::multibodies_test

@@ -19,7 +19,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::multisphere_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -123,3 +123,4 @@ TEST_CASE("Balls rest in a groove at the depth of its two faces") {
         CHECK(std::abs(deepestWith(ContactAccuracy::samples, voxels * h)) > 0.1f * h);
     }
 }
+}  // namespace bilayer::multisphere_test

@@ -17,7 +17,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::open_surface_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -138,3 +138,4 @@ TEST_CASE("A vertex below a crease of triangles has the depths of both faces") {
         }
     }
 }
+}  // namespace bilayer::open_surface_test

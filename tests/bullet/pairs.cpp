@@ -17,7 +17,7 @@
 #include "integration/bullet/detail/contact_shapes.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::pairs_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -384,3 +384,4 @@ TEST_CASE("A ghost object that dispatches its own pairs does not count as a step
     CHECK(world.dispatcher.statistics().contactsKept == before.contactsKept);
     world.dynamics.removeCollisionObject(&ghost);
 }
+}  // namespace bilayer::pairs_test

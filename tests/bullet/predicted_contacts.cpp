@@ -10,7 +10,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::predicted_contacts_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -132,3 +132,4 @@ TEST_CASE("Contact tests between steps use the current poses of fast bodies") {
     CHECK(body->getCenterOfMassPosition().z() > 0.25f);
     CHECK(body->getCenterOfMassPosition().z() < 0.35f);
 }
+}  // namespace bilayer::predicted_contacts_test

@@ -15,7 +15,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::rest_stabilisation_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -342,3 +342,4 @@ TEST_CASE("A stack on a slow lift or belt moves with it") {
     for (std::size_t i = 0; i < stack.size(); ++i)
         CHECK((stack[i]->getCenterOfMassPosition() - before[i]).distance(expected) < 0.1f * expected.length());
 }
+}  // namespace bilayer::rest_stabilisation_test

@@ -13,7 +13,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::rolling_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -152,3 +152,4 @@ TEST_CASE("Bodies that spin in place neither rise nor sink") {
     }
     CHECK(deepest > -0.5f * (ground == 2 ? 0.02f : h));
 }
+}  // namespace bilayer::rolling_test

@@ -18,7 +18,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::sampled_pairs_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -199,3 +199,4 @@ TEST_CASE("the processor takes over if the sampler fails half-way, with the same
     CHECK(std::count_if(played.sampled.begin(), played.sampled.end(), [](int pairs) { return pairs > 0; }) == 5);
     CHECK(played.poses == expected.poses);
 }
+}  // namespace bilayer::sampled_pairs_test

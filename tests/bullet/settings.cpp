@@ -10,7 +10,7 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 
-using namespace bilayer;
+namespace bilayer::settings_test {
 using bullet::recommendSettings;
 using bullet::SceneRequirements;
 using bullet::Settings;
@@ -149,3 +149,4 @@ TEST_CASE("Invalid scenes are rejected by name") {
                       Catch::Contains("voxel size") && Catch::Contains("1e+09"));
     CHECK_THROWS_AS(recommendSettings(MeshReport{}, {}), std::invalid_argument);
 }
+}  // namespace bilayer::settings_test

@@ -13,7 +13,7 @@
 #include "demos/shared/shapes.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::shape_test {
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -334,3 +334,4 @@ TEST_CASE("Invalid arguments are rejected by name") {
     CHECK_THROWS_AS(shape.setLocalScaling({-1, -1, -1}), std::invalid_argument);
     CHECK_THROWS_AS(shape.setMargin(-1), std::invalid_argument);
 }
+}  // namespace bilayer::shape_test

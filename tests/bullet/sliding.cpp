@@ -17,7 +17,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::sliding_test {
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -329,3 +329,4 @@ TEST_CASE("Contacts with waves have normals of the triangles around them, howeve
         CHECK(oblique == 0);
     }
 }
+}  // namespace bilayer::sliding_test

@@ -16,7 +16,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::smooth_ground_test {
 using namespace bilayer::test;
 using bullet::Shape;
 using bullet::WorldExtensions;
@@ -258,3 +258,4 @@ TEST_CASE("The maximum turn of smooth edges is that of two half planes, without 
     CHECK(detail::maxSmoothEdgeAngle(roof(glm::radians(30.f))) == 0);
     CHECK(detail::maxSmoothEdgeAngle({}) == 0);
 }
+}  // namespace bilayer::smooth_ground_test

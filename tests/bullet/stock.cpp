@@ -13,7 +13,7 @@
 #include "demos/shared/shapes.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::stock_test {
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -191,3 +191,4 @@ TEST_CASE("A world whose dispatcher does not know fields gets one warning, whate
     const auto know = [&](StockWorld& stock) { fields = std::make_unique<bullet::FieldAlgorithms>(stock.dispatcher); };
     CHECK(fall(slab, field, 1, know).empty());
 }
+}  // namespace bilayer::stock_test

@@ -19,7 +19,7 @@
 #include "tests/support/support.h"
 #include "world.h"
 
-using namespace bilayer;
+namespace bilayer::triangle_ids_test {
 using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
@@ -345,3 +345,4 @@ TEST_CASE("A small box names the triangle and the children that Bullet's own box
         }
     }
 }
+}  // namespace bilayer::triangle_ids_test

@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <optional>
 
-using namespace bilayer;
+namespace bilayer::device_test {
 using Catch::Matchers::Contains;
 
 namespace {
@@ -93,3 +93,4 @@ TEST_CASE("what the process without drivers checks", "[.child]") {
     CHECK_THROWS_AS(openDevice(), DeviceError);
     CHECK_THROWS_WITH(openDevice("any"), Contains("no OpenCL device"));
 }
+}  // namespace bilayer::device_test

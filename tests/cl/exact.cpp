@@ -13,8 +13,7 @@
 #include "tests/support/truth.h"
 #include "tests/support/verdict.h"
 
-using namespace bilayer;
-
+namespace bilayer::exact_test {
 namespace {
 
 constexpr std::size_t manyVoxels = 10000;  // active voxels checked per mesh; smaller grids are checked completely
@@ -63,3 +62,4 @@ TEST_CASE("an OpenCL device builds exact fields in both mappings, of thin, sharp
                  shapes::torusKnot(2, 3, 1.f, 0.2f, 150, 12), shapes::cylinder(0.3f, 2, 800), shapes::sphere(1.f, 5));
     checkExact(mesh, resolution, {2.5, 1.5}, mapping, seed);
 }
+}  // namespace bilayer::exact_test

@@ -15,7 +15,7 @@
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::field_test {
 using namespace bilayer::test;
 using Catch::Matchers::Contains;
 
@@ -274,3 +274,4 @@ TEST_CASE("what needs the processor cannot stay on the device, nor what exceeds 
     for (const glm::uvec3& t : other.triangles) both.triangles.push_back(t + shift);
     CHECK_THROWS_WITH(DeviceField(device, both, optionsFor(both, 40, Method::exact)), Contains("contradict"));
 }
+}  // namespace bilayer::field_test

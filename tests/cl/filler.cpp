@@ -24,7 +24,7 @@
 #include "tests/support/support.h"
 #include "tests/support/tiles.h"
 
-using namespace bilayer;
+namespace bilayer::filler_test {
 using namespace bilayer::detail;
 using Catch::Matchers::Contains;
 
@@ -391,3 +391,4 @@ TEST_CASE("the filler reports its name and device") {
     CHECK(openclFiller(device).backend() == "opencl");
     CHECK(openclFiller(device).device() == device.info().name);
 }
+}  // namespace bilayer::filler_test

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <string>
 
+namespace bilayer::kernel_test {
 namespace {
 
 bool runs(const std::string& command) {
@@ -29,3 +30,4 @@ TEST_CASE("every kernel compiles offline in every mapping without a warning") {
     CHECK(std::system((command + path).c_str()) == 0);
     CHECK_FALSE(runs(command + " -D kernel=nonsense" + path));
 }
+}  // namespace bilayer::kernel_test

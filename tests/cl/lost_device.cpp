@@ -18,7 +18,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 
-using namespace bilayer;
+namespace bilayer::lost_device_test {
 using namespace bilayer::detail;
 using Catch::Matchers::Contains;
 
@@ -175,3 +175,4 @@ TEST_CASE("points are sampled again once a device that was lost is back") {
     sampler.data().sample(bodies, queries, found);
     CHECK(found.begins == expected.begins);
 }
+}  // namespace bilayer::lost_device_test

@@ -20,7 +20,7 @@
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::prism_test {
 using namespace bilayer::detail;
 using Catch::Matchers::Contains;
 
@@ -374,3 +374,4 @@ TEST_CASE("without a device there are no prisms") {
     CHECK_THROWS_WITH(build(mesh, options), Contains("prism") && Contains("OpenCL"));
     CHECK_THROWS_WITH(rebuild(built(mesh, options), mesh, mesh, {}, options), Contains("prism") && Contains("OpenCL"));
 }
+}  // namespace bilayer::prism_test

@@ -9,7 +9,7 @@
 
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::program_test {
 using namespace bilayer::detail;
 using Catch::Matchers::Contains;
 
@@ -173,3 +173,4 @@ TEST_CASE("another driver, platform, source or option is another file in the cac
         CHECK(cachedProgram(other, source, options) != path);
     }
 }
+}  // namespace bilayer::program_test

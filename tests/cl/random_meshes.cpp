@@ -16,8 +16,7 @@
 #include "tests/fuzz/mesh_recipe.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::random_meshes_test {
 namespace {
 
 struct Recipe {
@@ -87,3 +86,4 @@ TEST_CASE("random meshes have the same exact field on an OpenCL device as on the
     }
     CHECK(voxels > 1000);
 }
+}  // namespace bilayer::random_meshes_test

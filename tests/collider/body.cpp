@@ -26,7 +26,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::body_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -366,3 +366,4 @@ TEST_CASE("other programs see a body's points where they are") {
         }
     }
 }
+}  // namespace bilayer::body_test

@@ -16,7 +16,7 @@
 #include "tests/support/support.h"
 #include "touching_bodies.h"
 
-using namespace bilayer;
+namespace bilayer::collide_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -320,3 +320,4 @@ TEST_CASE("without triangles, a margin wider than the band takes the distances o
     REQUIRE(contacts.size() > 10);
     CHECK(minDistance(contacts) == Approx(3 * h).margin(0.05 * h));
 }
+}  // namespace bilayer::collide_test

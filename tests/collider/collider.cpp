@@ -19,7 +19,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::collider_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -109,3 +109,4 @@ TEST_CASE("a collider rejects the level set of another mesh") {
 TEST_CASE("a collider rejects an empty mesh") {
     REQUIRE_THROWS_AS(Collider(Mesh{}, levelSetOf(sphereSolid(0.4), h)), std::invalid_argument);
 }
+}  // namespace bilayer::collider_test

@@ -19,7 +19,7 @@
 #include "tests/support/truth.h"
 #include "touching_bodies.h"
 
-using namespace bilayer;
+namespace bilayer::contact_accuracy_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -135,3 +135,4 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
         CHECK(sampled.foot > 0.05);
     }
 }
+}  // namespace bilayer::contact_accuracy_test

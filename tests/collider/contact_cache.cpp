@@ -14,7 +14,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::contact_cache_test {
 using namespace bilayer::detail;
 using test::Random;
 
@@ -124,3 +124,4 @@ TEST_CASE("what was kept of other bodies, or for another margin, is not used") {
                 REQUIRE(sameBytes(with, without));
             }
 }
+}  // namespace bilayer::contact_cache_test

@@ -17,7 +17,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::contact_reduction_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -320,3 +320,4 @@ TEST_CASE("Contact reduction always keeps the deepest contact of bodies at rest,
         CHECK(kept - deepest <= 1.5f * normalMotionTolerance);  // the extent is below 1.5 m
     }
 }
+}  // namespace bilayer::contact_reduction_test

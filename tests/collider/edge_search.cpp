@@ -11,7 +11,7 @@
 #include "collider/contact/edge_search.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::edge_search_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -67,3 +67,4 @@ TEST_CASE("An edge below two faces has the depth of the minimum translation over
         CHECK(glm::dot(found->normal, along) == Approx(0).margin(1e-5));
     }
 }
+}  // namespace bilayer::edge_search_test

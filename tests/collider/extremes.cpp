@@ -19,7 +19,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::extremes_test {
 using namespace bilayer::test;
 
 namespace {
@@ -352,3 +352,4 @@ TEST_CASE("distances and impacts of bodies anywhere, of any size, along any path
         if (impact.found) REQUIRE((impact.fraction >= 0 && impact.fraction <= 1));
     }
 }
+}  // namespace bilayer::extremes_test

@@ -20,7 +20,7 @@
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::field_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -323,3 +323,4 @@ TEST_CASE("bounds of points as far away as floats reach are finite, and so are t
     grids->distance = grid;
     CHECK_THROWS_AS(Field(LevelSet(grids)), std::invalid_argument);
 }
+}  // namespace bilayer::field_test

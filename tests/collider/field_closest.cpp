@@ -25,7 +25,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::field_closest_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -325,3 +325,4 @@ TEST_CASE("a point on an edge or a vertex has that feature, and its pseudonormal
         CHECK(wrongBatch == 0);
     }
 }
+}  // namespace bilayer::field_closest_test

@@ -21,7 +21,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::field_overlaps_test {
 using namespace bilayer::test;
 
 namespace {
@@ -299,3 +299,4 @@ TEST_CASE("overlaps of what is no sphere and no box are none") {
     REQUIRE_THROWS_AS(bare.overlapsSphere(points, radii, answers), std::invalid_argument);
     REQUIRE_THROWS_AS(bare.overlapsBox(boxes, answers), std::invalid_argument);
 }
+}  // namespace bilayer::field_overlaps_test

@@ -20,7 +20,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::field_rays_test {
 using namespace bilayer::test;
 
 namespace {
@@ -325,3 +325,4 @@ TEST_CASE("segments are exact at any length, and hit the face that they end on")
         CHECK(missed == 0);
     }
 }
+}  // namespace bilayer::field_rays_test

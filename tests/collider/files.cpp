@@ -26,7 +26,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::files_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -62,7 +62,7 @@ struct Answers {
     std::vector<float> distances;
 
     explicit Answers(const Collider& collider)
-        : contacts(::contacts(collider, collider).size()), volume(collider.mass().volume) {
+        : contacts(files_test::contacts(collider, collider).size()), volume(collider.mass().volume) {
         for (const Field* field : {&collider.field(), &collider.exactField()})
             for (float y = -0.5f; y <= 0.5f; y += 0.125f)
                 for (const glm::vec3 p : {glm::vec3(0.1f, y, 0), glm::vec3(0, y, 0.15f)}) {
@@ -310,3 +310,4 @@ TEST_CASE("what is written can be read, whatever the size of the body") {
     body.mass->inertia[0][0] = std::numeric_limits<float>::infinity();
     REQUIRE_THROWS_AS(withBody(field, body), std::invalid_argument);
 }
+}  // namespace bilayer::files_test

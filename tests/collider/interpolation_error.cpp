@@ -20,7 +20,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::interpolation_error_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -127,3 +127,4 @@ TEST_CASE("edges are in the interpolation-error mask, faces and gentle bends are
     CHECK_FALSE(smooth.data().isExactAt({0.4f, 0, 0}));
     CHECK(smooth.data().isExactAt({0.4f, 0, 0}, true));
 }
+}  // namespace bilayer::interpolation_error_test

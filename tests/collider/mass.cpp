@@ -29,7 +29,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::mass_test {
 using namespace bilayer::test;
 
 namespace {
@@ -367,3 +367,4 @@ TEST_CASE("the mass of a field has the same bytes for any number of threads") {
         CHECK(std::memcmp(&one, &more, sizeof one) == 0);
     }
 }
+}  // namespace bilayer::mass_test

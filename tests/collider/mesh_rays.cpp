@@ -22,7 +22,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::mesh_rays_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -282,3 +282,4 @@ TEST_CASE("a box meets a triangle where something is left of it in the box") {
         REQUIRE(std::count(met.begin(), met.end(), 0) > 20);
     }
 }
+}  // namespace bilayer::mesh_rays_test

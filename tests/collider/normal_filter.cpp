@@ -16,7 +16,7 @@
 #include "tests/support/support.h"
 #include "touching_bodies.h"
 
-using namespace bilayer;
+namespace bilayer::normal_filter_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -98,3 +98,4 @@ TEST_CASE("convex vertices in contact are pushed apart along their entry directi
         }
     }
 }
+}  // namespace bilayer::normal_filter_test

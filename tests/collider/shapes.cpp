@@ -22,7 +22,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::shapes_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -292,3 +292,4 @@ TEST_CASE("The hull of points encloses them all, is closed, and has flat faces i
         CHECK(hull.faces.size() == 6);
     }
 }
+}  // namespace bilayer::shapes_test

@@ -10,7 +10,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::sharp_edges_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -44,3 +44,4 @@ TEST_CASE("Sharp edges are those of the mesh, and none crosses a groove") {
     // the pieces cover all twelve edges once
     if (!grooved) CHECK(total == Approx(4 * 2 * (0.5 + 0.4 + 0.3)).epsilon(1e-3));
 }
+}  // namespace bilayer::sharp_edges_test

@@ -19,7 +19,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::sides_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -217,3 +217,4 @@ TEST_CASE("closest, inside and sample have the side of the winding number on pub
         CHECK(found.closeClosest <= found.close / 10000);
     }
 }
+}  // namespace bilayer::sides_test

@@ -16,7 +16,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::surface_points_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -302,3 +302,4 @@ TEST_CASE("dirty meshes have points, empty ones are refused") {
     const Mesh line{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}};
     REQUIRE_THROWS_AS(SurfacePoints(line, 1), std::invalid_argument);
 }
+}  // namespace bilayer::surface_points_test

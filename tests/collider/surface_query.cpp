@@ -8,7 +8,7 @@
 #include "tests/support/support.h"
 #include "touching_bodies.h"
 
-using namespace bilayer;
+namespace bilayer::surface_query_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -30,3 +30,4 @@ TEST_CASE("a point on a face has the face's normal, however near it is to an edg
         REQUIRE(std::abs(sample.distance) < 2e-3f * h);
     }
 }
+}  // namespace bilayer::surface_query_test

@@ -18,7 +18,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::time_of_impact_test {
 using namespace bilayer::test;
 
 namespace {
@@ -47,7 +47,7 @@ TriangleSheet squareSheet() {
     }};
 }
 
-Pose randomPose(Random& random, float distance) {
+Pose poseWithin(Random& random, float distance) {
     return {distance * random.direction(), glm::angleAxis(float(random(0, 3)), random.direction())};
 }
 
@@ -62,8 +62,8 @@ TEST_CASE("Moving bodies touch when samples of their motion say so, and never pa
     int hits = 0, misses = 0;
     // one round in nine misses, so a few seeds need more rounds
     for (int round = 0; round < 150 || (misses <= 10 && round < 300); ++round) {
-        Placed a{shapes[round % 3], randomPose(random, 0), float(random(0.5, 2))};
-        Placed b{shapes[round / 3 % 3], randomPose(random, 3), float(random(0.5, 2))};
+        Placed a{shapes[round % 3], poseWithin(random, 0), float(random(0.5, 2))};
+        Placed b{shapes[round / 3 % 3], poseWithin(random, 3), float(random(0.5, 2))};
         // towards each other, some at many sizes a step, so that they meet, graze, or miss
         const float far = random(0, 1) < 0.3 ? 40.f : 6.f;
         b.motion = {-far / 3 * (b.pose.position + 0.7f * random.direction()), float(random(0, 6)) * random.direction()};
@@ -270,3 +270,4 @@ TEST_CASE("A body that slides towards a crease of triangles is stopped in front 
         CHECK(stops <= 3);
     }
 }
+}  // namespace bilayer::time_of_impact_test

@@ -18,7 +18,7 @@
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::zero_set_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -368,3 +368,4 @@ TEST_CASE("without the mesh, spheres stop where they touch the interpolant's zer
         REQUIRE(missed > 20);
     }
 }
+}  // namespace bilayer::zero_set_test

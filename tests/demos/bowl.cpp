@@ -11,8 +11,7 @@
 #include <bilayer/sdf/vdb_io.h>
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::bowl_test {
 TEST_CASE(
     "the bowl demo writes its field and its recording, prints its table, and reports whether its criteria are met") {
     const auto out = test::scratch("bowl"), log = test::scratch("bowl.txt");
@@ -33,3 +32,4 @@ TEST_CASE(
     for (const char* wrong : {"--bodies 0", "--seconds nan"})
         CHECK(WEXITSTATUS(std::system(fmt::format("{} {} 2>/dev/null", BILAYER_BOWL, wrong).c_str())) == 2);
 }
+}  // namespace bilayer::bowl_test

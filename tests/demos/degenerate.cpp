@@ -10,7 +10,7 @@
 #include "demos/shared/stage.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::degenerate_test {
 using demo::Thing;
 
 namespace {
@@ -102,3 +102,4 @@ TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest
         CHECK(at.z > -half);
     }
 }
+}  // namespace bilayer::degenerate_test

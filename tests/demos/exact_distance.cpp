@@ -11,8 +11,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::exact_distance_test {
 TEST_CASE("the exact distance agrees with brute force and the winding number") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
@@ -40,3 +39,4 @@ TEST_CASE("penetration is the depth of the deepest surface point") {
     CHECK(demo::penetration(cube, {}, cube, {{0, 0, 0.5f + float(corner) - 0.08f}, onCorner}) ==
           Approx(0.08).epsilon(0.02));
 }
+}  // namespace bilayer::exact_distance_test

@@ -17,7 +17,7 @@
 #include "demos/shared/threads.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::machines_test {
 using namespace bilayer::shapes;
 
 namespace {
@@ -358,3 +358,4 @@ TEST_CASE("impossible parts are rejected") {
     CHECK_THROWS_AS(chain(3, 5e-3f, 3e-3f), std::invalid_argument);
     CHECK_THROWS_AS(chain(3, 10e-3f, 1e-3f, 9e-3f), std::invalid_argument);
 }
+}  // namespace bilayer::machines_test

@@ -14,8 +14,7 @@
 #include "demos/shared/stage.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::outcome_test {
 TEST_CASE("a criterion is met up to its limit, and never by a NaN") {
     CHECK(demo::Criterion{"at", 1, 1}.met());
     CHECK_FALSE(demo::Criterion{"above", 1.001, 1}.met());
@@ -113,3 +112,4 @@ TEST_CASE("an outcome is written as a recording, a table of energies and fields"
     for (std::string line; std::getline(table, line);) ++lines;
     CHECK(lines == 1 + 25);
 }
+}  // namespace bilayer::outcome_test

@@ -11,8 +11,7 @@
 
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::plot_test {
 namespace {
 
 std::vector<std::pair<double, double>> circles(const std::string& svg) {
@@ -68,3 +67,4 @@ TEST_CASE("equal differences are equal distances in a linear plot, which starts 
     CHECK(svg.find(fmt::format("y1=\"{:.1f}\"", 2 * at[0].second - at[2].second)) != std::string::npos);
     for (const char* tick : {">0<", ">20<", ">80<", ">0.5<"}) CHECK(svg.find(tick) != std::string::npos);
 }
+}  // namespace bilayer::plot_test

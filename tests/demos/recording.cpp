@@ -10,8 +10,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::recording_test {
 namespace {
 
 std::string textOf(const std::filesystem::path& path) {
@@ -147,3 +146,4 @@ TEST_CASE("a frame has a surface for each body that changes") {
     recording.frame(0, {}, std::vector<Mesh>{ball});
     CHECK_THROWS_AS(recording.addChanging({}), std::invalid_argument);
 }
+}  // namespace bilayer::recording_test

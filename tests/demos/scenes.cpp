@@ -23,7 +23,7 @@
 #include "demos/shared/stage.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::scenes_test {
 using demo::Outcome;
 
 namespace {
@@ -300,3 +300,4 @@ TEST_CASE("bodies in Enright's deformation flow lose no more volume than OpenVDB
         CHECK(ours < 0.9);
     }
 }
+}  // namespace bilayer::scenes_test

@@ -8,8 +8,7 @@
 #include <glm/geometric.hpp>
 #include <set>
 
-using namespace bilayer;
-
+namespace bilayer::shapes_test {
 namespace {
 
 using Corners = std::array<glm::dvec3, 3>;
@@ -133,3 +132,4 @@ TEST_CASE("uneven spheres have the areas and the shapes of triangles that they c
     CHECK_THROWS_AS(shapes::unevenSphere(0), std::invalid_argument);
     CHECK_THROWS_AS(shapes::unevenSphere(1), std::invalid_argument);
 }
+}  // namespace bilayer::shapes_test

@@ -13,7 +13,7 @@
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::water_test {
 using openvdb::Coord;
 using openvdb::FloatGrid;
 
@@ -136,3 +136,4 @@ TEST_CASE("lost volume comes back in the time asked for") {
     CHECK(water.volume() == Approx(whole).epsilon(5e-3));
     CHECK(water.restored() == Approx(whole - first).epsilon(0.1));
 }
+}  // namespace bilayer::water_test

@@ -15,7 +15,7 @@
 #include "liquids.h"
 #include "sdf/base/openvdb.h"
 
-using namespace bilayer;
+namespace bilayer::cancel_test {
 using namespace bilayer::test;
 using openvdb::FloatGrid;
 
@@ -47,3 +47,4 @@ TEST_CASE("seeding, particles and obstacles can be cancelled wherever they ask")
     check([&](const auto& progress) { fluid::solid(mesh, {}, *cells, {.progress = progress}); });
     check([&](const auto& progress) { fluid::solid(field, {}, *cells, {.progress = progress}); });
 }
+}  // namespace bilayer::cancel_test

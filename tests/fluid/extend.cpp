@@ -9,8 +9,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 
-using namespace bilayer;
-
+namespace bilayer::extend_test {
 TEST_CASE("fill keeps the band and knows every other voxel of the box") {
     const float h = 0.04f;
     const LevelSet band =
@@ -82,3 +81,4 @@ TEST_CASE("extend() rejects fields without an inside and boxes that are too larg
     CHECK_THROWS_AS(fluid::extend(apart, std::numeric_limits<float>::quiet_NaN()), std::invalid_argument);
     CHECK_THROWS_WITH(fluid::extend(apart, 1e30f), Catch::Matchers::Contains("too far"));
 }
+}  // namespace bilayer::extend_test

@@ -18,7 +18,7 @@
 #include "liquids.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::lattice_cover_test {
 using namespace bilayer::test;
 
 TEST_CASE(
@@ -132,3 +132,4 @@ TEST_CASE("rotated plates of any size cover the lattices that brute force finds 
     CHECK(complete > 5);
     CHECK(complete < tried - 5);
 }
+}  // namespace bilayer::lattice_cover_test

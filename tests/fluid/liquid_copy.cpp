@@ -13,7 +13,7 @@
 #include "liquids.h"
 #include "sdf/base/openvdb.h"
 
-using namespace bilayer;
+namespace bilayer::liquid_copy_test {
 using namespace bilayer::test;
 using openvdb::FloatGrid;
 
@@ -55,3 +55,4 @@ TEST_CASE("a body and a liquid with origins meet where these put them") {
         difference = std::max(difference, double(std::abs(*voxel - there->tree().getValue(voxel.getCoord()))));
     CHECK(difference < 1e-6);
 }
+}  // namespace bilayer::liquid_copy_test

@@ -13,7 +13,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 
-using namespace bilayer;
+namespace bilayer::obstacle_test {
 using openvdb::Coord;
 using openvdb::math::Transform;
 
@@ -127,3 +127,4 @@ TEST_CASE("bad input is refused") {
     const LevelSet empty = build(sheet, {.voxelSize = 0.05f, .sign = Sign::flood});
     CHECK_THROWS_WITH(fluid::solid(empty, {}, *cells), Catch::Matchers::Contains("no inside"));
 }
+}  // namespace bilayer::obstacle_test

@@ -17,7 +17,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 
-using namespace bilayer;
+namespace bilayer::particles_test {
 using openvdb::FloatGrid;
 using openvdb::math::Transform;
 
@@ -162,3 +162,4 @@ TEST_CASE("no liquid, no particles; no level set, an error") {
     CHECK_THROWS_AS(fluid::particles(body, {{}, {1, -1, 1}}, *voxels), std::invalid_argument);
     CHECK_THROWS_AS(fluid::particles(body, {{}, glm::vec3(100)}, *tiny), std::invalid_argument);
 }
+}  // namespace bilayer::particles_test

@@ -19,7 +19,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::repair_test {
 using namespace bilayer::test;
 using openvdb::FloatGrid;
 
@@ -142,3 +142,4 @@ TEST_CASE("boxes stacked face on face seed as one, wherever voxels lie") {
             }
         }
 }
+}  // namespace bilayer::repair_test

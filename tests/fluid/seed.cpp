@@ -22,7 +22,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::seed_test {
 using namespace bilayer::test;
 using openvdb::FloatGrid;
 
@@ -370,3 +370,4 @@ TEST_CASE("bad input throws and changes nothing") {
     CHECK(own->empty());
     CHECK_THROWS_AS(fluid::seed(*liquid, Mesh{}), std::invalid_argument);
 }
+}  // namespace bilayer::seed_test

@@ -15,7 +15,7 @@
 #include "sdf/base/openvdb.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::solvers_test {
 using openvdb::FloatGrid;
 
 namespace {
@@ -111,3 +111,4 @@ TEST_CASE("LevelSetAdvection carries a seeded body away as it is") {
     CHECK(openvdb::tools::levelSetVolume(*liquid) == Approx(volume).epsilon(2e-3));
     CHECK(openvdb::tools::checkLevelSet(*liquid) == "");
 }
+}  // namespace bilayer::solvers_test

@@ -10,6 +10,7 @@
 #include <bilayer/collider/shapes.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/finite.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/checks.h"
 
@@ -40,10 +41,6 @@ struct CollidedShapes {
                                   }})};
 };
 
-bool isFinite(const glm::vec3& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 /// Scales differ by at most this power of two: bodies of thousands of voxels along an edge take minutes.
 constexpr float maxScalePower = 6;
 
@@ -68,16 +65,16 @@ PlacedShape placed(const ContactShape& shape, ByteSource& bytes) {
 }
 
 bool isOrdinary(const PlacedShape& body) {
-    return isFinite(body.pose.position) && glm::length(body.pose.position) < 1e3f &&
+    return detail::isFinite(body.pose.position) && glm::length(body.pose.position) < 1e3f &&
            std::abs(glm::length(body.pose.rotation) - 1) < 1e-5f && body.scale > 1e-2f && body.scale < 1e2f &&
-           isFinite(body.motion.displacement) && isFinite(body.motion.rotation) &&
+           detail::isFinite(body.motion.displacement) && detail::isFinite(body.motion.rotation) &&
            glm::length(body.motion.displacement) < 1e3f && glm::length(body.motion.rotation) < 10;
 }
 
 void requireContacts(const std::vector<Contact>& contacts) {
     for (const Contact& contact : contacts) {
-        require(isFinite(contact.position) && isFinite(contact.normal) && std::isfinite(contact.distance) &&
-                    std::isfinite(contact.approach),
+        require(detail::isFinite(contact.position) && detail::isFinite(contact.normal) &&
+                    std::isfinite(contact.distance) && std::isfinite(contact.approach),
                 "a contact is not finite");
         require(std::abs(glm::length(contact.normal) - 1) < 1e-3f, "a contact's normal is not of unit length");
     }
@@ -102,7 +99,7 @@ void checkDistance(const PlacedShape& a, const PlacedShape& b, bool isJudged) {
     const BodyDistance there = distance(a, b), back = distance(b, a);
     if (!isJudged) return;
     require(there.found && back.found, "two bodies have no distance");
-    require(std::isfinite(there.distance) && isFinite(there.a.position) && isFinite(there.b.position),
+    require(std::isfinite(there.distance) && detail::isFinite(there.a.position) && detail::isFinite(there.b.position),
             "a distance is not finite");
     const float length = glm::length(there.normal);
     require(std::abs(length - 1) < 1e-3f || length == 0, "a distance's normal is not of unit length");
@@ -115,7 +112,8 @@ void checkImpact(const PlacedShape& a, const PlacedShape& b, bool isJudged) {
     const Impact impact = timeOfImpact(a, b);
     if (!isJudged || !impact.found) return;
     require(impact.fraction >= 0 && impact.fraction <= 1, "an impact lies outside of the motion");
-    require(isFinite(impact.poseA.position) && isFinite(impact.poseB.position), "an impact's pose is not finite");
+    require(detail::isFinite(impact.poseA.position) && detail::isFinite(impact.poseB.position),
+            "an impact's pose is not finite");
 }
 
 }  // namespace

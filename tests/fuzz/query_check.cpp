@@ -7,6 +7,7 @@
 #include <bilayer/collider/field.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/finite.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/checks.h"
 
@@ -22,38 +23,35 @@ struct QueriedFields {
     Field withMesh{levelSet, mesh}, withoutMesh{levelSet}, fixed{levelSet, {.storage = Storage::fixed16}};
 };
 
-bool isFinite(const glm::vec3& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 bool isUnit(const glm::vec3& v) {
     return std::abs(glm::length(v) - 1) < 1e-4f;
 }
 
 void checkHit(const std::optional<RayHit>& hit, const Ray& ray, float radius) {
     if (!hit) return;
-    require(isFinite(ray.origin) && isFinite(ray.direction) && ray.direction != glm::vec3(0) && ray.maxDistance >= 0 &&
-                std::isfinite(radius) && radius >= 0,
+    require(detail::isFinite(ray.origin) && detail::isFinite(ray.direction) && ray.direction != glm::vec3(0) &&
+                ray.maxDistance >= 0 && std::isfinite(radius) && radius >= 0,
             "an invalid ray hits");
     require(hit->distance >= 0 && double(hit->distance) <= double(ray.maxDistance) * (1 + 1e-6) + 1e-5,
             "a hit lies outside of its ray");
-    require(isFinite(hit->position) && isUnit(hit->normal), "a hit has no finite position or no unit normal");
+    require(detail::isFinite(hit->position) && isUnit(hit->normal), "a hit has no finite position or no unit normal");
 }
 
 void checkPoint(const Field& field, const glm::vec3& point, float reach) {
     const Sample sample = field.sample(point);
     require(!std::isnan(sample.distance) && field.distance(point) == sample.distance, "a sample is not its distance");
-    require(isFinite(sample.gradient), "a gradient is not finite");
+    require(detail::isFinite(sample.gradient), "a gradient is not finite");
     const bool inside = field.inside(point);
     const ClosestPoint closest = field.closest(point, reach);
-    if (!isFinite(point)) {
+    if (!detail::isFinite(point)) {
         require(sample.distance == std::numeric_limits<float>::infinity() && !inside && !closest.found,
                 "a point that is not finite has an answer");
         return;
     }
     if (!closest.found) return;
     require(std::abs(closest.distance) <= reach, "a closest point is farther than the search radius");
-    require(isFinite(closest.position) && isUnit(closest.normal), "a closest point has no position or no unit normal");
+    require(detail::isFinite(closest.position) && isUnit(closest.normal),
+            "a closest point has no position or no unit normal");
     const double away = glm::length(glm::dvec3(point) - glm::dvec3(closest.position));
     require(std::abs(away - std::abs(double(closest.distance))) <= 1e-4 * (away + 1) ||
                 away > double(std::numeric_limits<float>::max()),
@@ -62,13 +60,14 @@ void checkPoint(const Field& field, const glm::vec3& point, float reach) {
 
 void checkOverlaps(const Field& field, ByteSource& bytes, const glm::vec3& point, float radius) {
     const bool overlaps = field.overlapsSphere(point, radius);
-    if (!isFinite(point) || !std::isfinite(radius) || radius < 0)
+    if (!detail::isFinite(point) || !std::isfinite(radius) || radius < 0)
         require(!overlaps, "an invalid sphere overlaps");
     else if (field.inside(point))
         require(overlaps, "a sphere around an inner point does not overlap");
     const OrientedBox box{point, bytes.anyVector(), bytes.flag() ? bytes.anyRotation() : glm::quat(1, 0, 0, 0)};
     const bool boxOverlaps = field.overlapsBox(box);
-    if (!isFinite(box.centre) || !isFinite(box.halfSize)) require(!boxOverlaps, "an invalid box overlaps");
+    if (!detail::isFinite(box.centre) || !detail::isFinite(box.halfSize))
+        require(!boxOverlaps, "an invalid box overlaps");
 }
 
 }  // namespace

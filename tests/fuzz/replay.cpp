@@ -14,6 +14,7 @@
 #include "tests/support/damage.h"
 #include "tests/support/support.h"
 
+namespace bilayer::replay_test {
 using namespace bilayer::test;
 
 namespace {
@@ -105,3 +106,4 @@ TEST_CASE("contacts and distances of bodies in any pose are valid") {
 TEST_CASE("rebuilt fields after any edits are those built in full") {
     replay("rebuild", 40);
 }
+}  // namespace bilayer::replay_test

@@ -26,7 +26,7 @@ namespace {
 
 constexpr openvdb::Index64 maxQueriedLeaves = 1000;  // larger fields of a small file are not queried: they take seconds
 constexpr int maxQueriedSide = 4096;                 // [voxels]
-constexpr unsigned maxEdits = 3;
+constexpr unsigned maxEntryEdits = 3;
 
 void useField(const LevelSet& levelSet) {
     const openvdb::FloatGrid& grid = *levelSet.grids().distance;
@@ -151,7 +151,7 @@ void checkVdbEntries(Bytes edits) {
     static const LevelSet field = fieldWithBody();
     ByteSource bytes(edits);
     const openvdb::FloatGrid::Ptr grid = field.grids().distance->deepCopy();
-    for (unsigned count = 1 + bytes.below(maxEdits); count > 0; --count)
+    for (unsigned count = 1 + bytes.below(maxEntryEdits); count > 0; --count)
         bytes.byte() % 4 ? editEntry(*grid, bytes) : editVoxels(*grid, bytes);
     const std::filesystem::path path = scratch("entries.vdb");
     writeGrids(path, {grid, field.grids().points});

@@ -13,6 +13,7 @@
 
 #include "sources.h"
 
+namespace bilayer::house_test {
 using namespace bilayer::test;
 
 namespace {
@@ -233,3 +234,4 @@ TEST_CASE("a test that is a command has its programs built before it runs") {
     CHECK(wrong == "");
     CHECK(found >= 6);
 }
+}  // namespace bilayer::house_test

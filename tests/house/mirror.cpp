@@ -13,6 +13,7 @@
 
 #include "sources.h"
 
+namespace bilayer::mirror_test {
 using namespace bilayer::test;
 
 namespace {
@@ -131,3 +132,4 @@ TEST_CASE("a test reaches a unit that it includes, names, or uses through the st
     CHECK(reaches("build(mesh);\n", "sdf/bvh/tree", header, "build"));
     CHECK_FALSE(reaches("rebuild(mesh);\n", "sdf/bvh/tree", header, "build"));
 }
+}  // namespace bilayer::mirror_test

@@ -9,6 +9,7 @@
 
 #include "sources.h"
 
+namespace bilayer::types_test {
 using namespace bilayer::test;
 
 namespace {
@@ -91,3 +92,4 @@ TEST_CASE("types with a body are found, and declarations are none") {
         found += type.space + ":" + type.name + " ";
     CHECK(found == ":A :B::Data :C :D :Hash<A> x::y:Z ");
 }
+}  // namespace bilayer::types_test

@@ -24,7 +24,7 @@
 #include "tests/bullet/world.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::refused_test {
 using namespace bilayer::test;
 
 namespace {
@@ -182,3 +182,4 @@ TEST_CASE("a world continues after a step that was refused memory") {
         CHECK(at.z() < 2);
     }
 }
+}  // namespace bilayer::refused_test

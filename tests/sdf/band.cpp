@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-using namespace bilayer;
+namespace bilayer::band_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -76,3 +76,4 @@ TEST_CASE("a block of which nothing is known is left alone") {
     CHECK_FALSE(trimToBand(distances.data(), {3, 3, 1}, values.data(), masks));
     CHECK(values[5] == 42.f);
 }
+}  // namespace bilayer::band_test

@@ -18,7 +18,7 @@
 #include "sdf/leaf/blocks.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::build_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -355,3 +355,4 @@ TEST_CASE("times add up") {
     CHECK(times.assemble > 0);
     CHECK(times.total >= times.tiles + times.fill + times.assemble - 1e-6);
 }
+}  // namespace bilayer::build_test

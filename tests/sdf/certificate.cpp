@@ -11,7 +11,7 @@
 #include "sdf/fill/clusters.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::certificate_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -133,3 +133,4 @@ TEST_CASE("a distance that is wrong by more than its bound breaks the certificat
     block.distance[unknown] = distance;
     CHECK_THROWS_AS(brick.check(at, block), std::logic_error);
 }
+}  // namespace bilayer::certificate_test

@@ -26,7 +26,7 @@
 #include "tests/support/polygons.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::child_process_test {
 using namespace bilayer::detail;
 using namespace std::chrono_literals;
 
@@ -249,3 +249,4 @@ TEST_CASE("polygons arrive as they were sent, or not at all") {
     ChildProcess complaining(ample, [](const ChildProcess::Send& send) { sendError(send, "no"); });
     CHECK_THROWS_WITH(receivePolygons(complaining, 1000), "no");
 }
+}  // namespace bilayer::child_process_test

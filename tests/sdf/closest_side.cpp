@@ -15,7 +15,7 @@
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::closest_side_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -144,3 +144,4 @@ TEST_CASE("pseudonormal: a double-sided open surface has no inside, by both meth
         }
     }
 }
+}  // namespace bilayer::closest_side_test

@@ -8,7 +8,7 @@
 #include "sdf/mesh/topology.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::closing_triangles_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -82,3 +82,4 @@ TEST_CASE("a closed mesh needs no closing triangles, and a loop of n edges n - 2
         requireClosed(fan);
     }
 }
+}  // namespace bilayer::closing_triangles_test

@@ -9,7 +9,7 @@
 #include "sdf/sign/triangle_columns.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::column_sums_test {
 using namespace bilayer::detail;
 
 TEST_CASE("column sums are added where two rectangles overlap") {
@@ -64,3 +64,4 @@ TEST_CASE("heights of triangles that are vertical but for rounding are uncertain
     CHECK(!sliver(1e-10).isCertain({0, 0}));
     CHECK(!sliver(0).isCertain({0, 0}));
 }
+}  // namespace bilayer::column_sums_test

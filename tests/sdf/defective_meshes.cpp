@@ -15,7 +15,7 @@
 #include "sdf/sign/sign_choice.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::defective_meshes_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -241,3 +241,4 @@ TEST_CASE("Of two components, only the one inside out is flipped") {
             CHECK(built.at(by - apart * axis) > 0);
         }
 }
+}  // namespace bilayer::defective_meshes_test

@@ -18,7 +18,7 @@
 #include "tests/support/support.h"
 #include "tests/support/tiles.h"
 
-using namespace bilayer;
+namespace bilayer::double_layer_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -240,3 +240,4 @@ TEST_CASE("a triangle whose area floats cannot hold changes nothing but what is 
     CHECK(changed == 0);
     CHECK(values.getValue(openvdb::Coord(0)) > -0.5f * options.voxelSize);  // so it has a sample too
 }
+}  // namespace bilayer::double_layer_test

@@ -21,8 +21,7 @@
 #include "tests/support/truth.h"
 #include "tests/support/verdict.h"
 
-using namespace bilayer;
-
+namespace bilayer::exact_test {
 namespace {
 
 constexpr std::size_t manyVoxels = 30000;  // active voxels checked per shape; smaller grids are checked completely
@@ -393,3 +392,4 @@ TEST_CASE("exact: a rotation by 90 degrees keeps the distances within float roun
         CHECK(lost == 0);
     }
 }
+}  // namespace bilayer::exact_test

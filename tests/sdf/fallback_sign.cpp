@@ -9,7 +9,7 @@
 #include "sdf/base/progress.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::fallback_sign_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -63,3 +63,4 @@ TEST_CASE("the last resort knows the side of every point") {
         checkSides(open, seed);
     }
 }
+}  // namespace bilayer::fallback_sign_test

@@ -21,7 +21,7 @@
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::field_tiles_test {
 using namespace bilayer::detail;
 using bilayer::test::sameFields;
 using Catch::Contains;
@@ -200,3 +200,4 @@ TEST_CASE("only tiles of one field are merged") {
     // half of a sphere is open where the other half is missing
     CHECK_THROWS_WITH(merger.merged(), Contains("contradict each other"));
 }
+}  // namespace bilayer::field_tiles_test

@@ -13,7 +13,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::fill_holes_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -126,3 +126,4 @@ TEST_CASE("what bounds no solid is not filled") {
     CHECK(filled.openLoops == 1);
     CHECK(hash(filled.mesh) == hash(buried));
 }
+}  // namespace bilayer::fill_holes_test

@@ -13,7 +13,7 @@
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::flood_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -213,3 +213,4 @@ TEST_CASE("a flood refuses a gap that the band does not hold") {
     CHECK_THROWS_AS(signByFlood(*grid, mesh, 5, {3, 3, 0.1f}), std::invalid_argument);
     CHECK_THROWS_AS(signByFlood(*grid, mesh, -1, {3, 3, 0.1f}), std::invalid_argument);
 }
+}  // namespace bilayer::flood_test

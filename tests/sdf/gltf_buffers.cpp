@@ -12,7 +12,7 @@
 #include "tests/support/polygons.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::gltf_buffers_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -56,3 +56,4 @@ TEST_CASE("glTF: truncated and damaged binary files are rejected") {
     std::ofstream(cut, std::ios::binary) << other;
     CHECK_THROWS_WITH(readScene(cut), Catch::Contains("binary glTF 1; only glTF 2"));
 }
+}  // namespace bilayer::gltf_buffers_test

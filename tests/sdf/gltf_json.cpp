@@ -12,7 +12,7 @@
 #include "tests/support/polygons.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::gltf_json_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 using nlohmann::json;
@@ -140,3 +140,4 @@ TEST_CASE("glTF: damaged JSON is rejected with line and column, or with its text
             "buffer 0: its byteLength is 0; it must be at least 1");
     damaged("[]", "its JSON is no object, as glTF's is");
 }
+}  // namespace bilayer::gltf_json_test

@@ -7,7 +7,7 @@
 #include "tests/support/gltf.h"
 #include "tests/support/polygons.h"
 
-using namespace bilayer;
+namespace bilayer::gltf_numbers_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 using nlohmann::json;
@@ -81,3 +81,4 @@ TEST_CASE("glTF: strides and sparse elements") {
     gltf.file["accessors"][0].erase("sparse");
     refuses(gltf, {"accessor 0", "neither a buffer view"});
 }
+}  // namespace bilayer::gltf_numbers_test

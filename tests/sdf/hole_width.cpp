@@ -14,7 +14,7 @@
 #include "sdf/mesh/orient.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::hole_width_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -91,3 +91,4 @@ TEST_CASE("the width of a hole does not depend on how the mesh lies") {
         }
     }
 }
+}  // namespace bilayer::hole_width_test

@@ -13,8 +13,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::inspect_test {
 namespace {
 
 // A box of 12 triangles whose upper corners are permuted relative to the lower ones. Bit i of `diagonals` selects the
@@ -249,3 +248,4 @@ TEST_CASE("the verdict says what is wrong") {
     CHECK(verdict(inspect(mesh)) == "open: 3 boundary edges in 1 loop");
     CHECK(verdict(inspect(Mesh{{{0, 0, 0}, {1, 0, 0}}, {{0, 0, 1}}})) == "no triangle has an area");
 }
+}  // namespace bilayer::inspect_test

@@ -20,8 +20,7 @@
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::locale_test {
 namespace {
 
 struct Commas : std::numpunct<char> {
@@ -127,3 +126,4 @@ TEST_CASE("decimal points in text files are read in a locale of decimal commas")
         CHECK((box.upper.y == 1 || box.upper.y == 0.5f));
     }
 }
+}  // namespace bilayer::locale_test

@@ -13,8 +13,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::mesh_test {
 namespace {
 
 Mesh triangle() {
@@ -147,3 +146,4 @@ TEST_CASE("the hash changes with every part of a mesh") {
     std::swap(other.triangles[3], other.triangles[4000]);
     CHECK(hash(sphere) != hash(other));
 }
+}  // namespace bilayer::mesh_test

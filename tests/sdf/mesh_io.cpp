@@ -10,8 +10,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::mesh_io_test {
 namespace {
 
 std::filesystem::path write(const std::string& name, const std::string& text) {
@@ -151,3 +150,4 @@ TEST_CASE("the public corpus's formats are read") {
     CHECK_THROWS(readMesh(*test::corpusMesh("formats/empty.obj")));
     CHECK_THROWS(readMesh(*test::corpusMesh("formats/stl_empty_bin.stl")));
 }
+}  // namespace bilayer::mesh_io_test

@@ -14,7 +14,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::mesh_readers_test {
 using namespace bilayer::test;
 using Catch::Contains;
 
@@ -278,3 +278,4 @@ TEST_CASE("Damaged files are read or rejected") {
     CHECK(read > 1000);
     CHECK(refused > 1000);
 }
+}  // namespace bilayer::mesh_readers_test

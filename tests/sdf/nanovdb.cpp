@@ -23,8 +23,7 @@
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::nanovdb_test {
 namespace {
 
 LevelSet torus(float voxelSize = 0.05f) {
@@ -166,3 +165,4 @@ TEST_CASE("a .nvdb file that cannot be written is named, and leaves what was the
     writeNanoVdb(path, field);
     CHECK(std::filesystem::file_size(path) > 100000);
 }
+}  // namespace bilayer::nanovdb_test

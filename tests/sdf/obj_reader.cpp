@@ -9,7 +9,7 @@
 #include "box_files.h"
 #include "demos/shared/shapes.h"
 
-using namespace bilayer;
+namespace bilayer::obj_reader_test {
 using namespace bilayer::test;
 
 TEST_CASE("OBJ: vertices may have three to eight numbers, in any way that numbers are written") {
@@ -83,3 +83,4 @@ TEST_CASE("OBJ: relative indices count back from where they stand, in files of a
         CHECK(report.volume == Approx(inspect(mesh).volume));
     }
 }
+}  // namespace bilayer::obj_reader_test

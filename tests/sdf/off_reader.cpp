@@ -8,7 +8,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "box_files.h"
 
-using namespace bilayer;
+namespace bilayer::off_reader_test {
 using namespace bilayer::test;
 using Catch::Contains;
 
@@ -58,3 +58,4 @@ TEST_CASE("OFF: an error at the end of the file says where, and how much is ther
         }
     }
 }
+}  // namespace bilayer::off_reader_test

@@ -10,7 +10,7 @@
 #include "sdf/sign/sign_choice.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::orient_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -176,3 +176,4 @@ TEST_CASE("orient() twice is orient() once, on all of the public corpus that is 
         if (balanced(mesh) && !hasFacesBackToBack(mesh)) CHECK(balanced(once.mesh));
     }
 }
+}  // namespace bilayer::orient_test

@@ -11,7 +11,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::part_nesting_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -148,3 +148,4 @@ TEST_CASE("a part of several bodies, and copies of parts, pass on no containers 
     for (int i = 0; i < 20; ++i) parts.add(body(0.05f, {float(random(0, 2)), 0, 0}, 0, random));
     check(parts, random);
 }
+}  // namespace bilayer::part_nesting_test

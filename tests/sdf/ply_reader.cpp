@@ -12,7 +12,7 @@
 #include "box_files.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::ply_reader_test {
 using namespace bilayer::test;
 using Catch::Contains;
 
@@ -159,3 +159,4 @@ TEST_CASE("PLY: strips of triangles are read, with breaks") {
     CHECK(area("9 0 1 2 3 -1 2 3 4 5\n") == Approx(2));
     CHECK(area("8 0 1 2 -1 -1 2 3 4\n") == Approx(1));
 }
+}  // namespace bilayer::ply_reader_test

@@ -25,7 +25,7 @@
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::progress_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -205,3 +205,4 @@ TEST_CASE("a build of any mesh can be cancelled wherever it asks") {
         }
     }
 }
+}  // namespace bilayer::progress_test

@@ -20,7 +20,7 @@
 #include "sdf/fill/pseudonormal.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::pseudonormal_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -320,3 +320,4 @@ TEST_CASE("pseudonormal: an exception of the sink ends the work") {
     const auto broken = [](const FilledBlocks&) { throw Cancelled(); };
     CHECK_THROWS_AS(fillPseudonormal({mesh, 0.3f, 3, false, true, broken, progress}), Cancelled);
 }
+}  // namespace bilayer::pseudonormal_test

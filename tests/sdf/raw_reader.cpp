@@ -7,7 +7,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "box_files.h"
 
-using namespace bilayer;
+namespace bilayer::raw_reader_test {
 using namespace bilayer::test;
 using Catch::Contains;
 
@@ -73,3 +73,4 @@ TEST_CASE("RAW: errors name the line and what is wrong in it") {
     CHECK_THROWS_WITH(readMesh(write("none.raw", "box\n")), Contains("none.raw: holds no triangle"));
     CHECK_THROWS_WITH(readMesh(write("none.raw", "")), Contains("none.raw"));
 }
+}  // namespace bilayer::raw_reader_test

@@ -12,7 +12,7 @@
 #include "tests/support/polygons.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::read_gltf_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 using nlohmann::json;
@@ -262,3 +262,4 @@ TEST_CASE("glTF: unknown required extensions are rejected by name") {
         accessor["bufferView"] = view;
     }
 }
+}  // namespace bilayer::read_gltf_test

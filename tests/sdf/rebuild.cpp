@@ -17,7 +17,7 @@
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::rebuild_test {
 using bilayer::test::sameFields;
 
 namespace {
@@ -224,3 +224,4 @@ TEST_CASE("a rebuild refuses what does not belong together, by name") {
     refused(before, after, moved, {.voxelSize = 0.05f, .triangles = true}, "nearest triangles");
     refused(before, after, moved, {.voxelSize = 0}, "voxelSize");
 }
+}  // namespace bilayer::rebuild_test

@@ -15,7 +15,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::scene_fuzz_test {
 using namespace bilayer::detail;
 using bilayer::test::Damage;
 using bilayer::test::SceneFile;
@@ -104,3 +104,4 @@ TEST_CASE("damaged glTF files are read or refused") {
         requireAnswer({name, bytes}, rounds(200), damage);
     }
 }
+}  // namespace bilayer::scene_fuzz_test

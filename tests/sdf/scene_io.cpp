@@ -14,7 +14,7 @@
 #include "tests/support/scene_files.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::scene_io_test {
 using namespace bilayer::detail;
 using bilayer::test::SceneFile;
 
@@ -154,3 +154,4 @@ TEST_CASE("the scenes of the public cases are read") {
     CHECK_THROWS_WITH(readMesh(*path("zip64.3mf")), Catch::Contains("zip64.3mf: is a ZIP64 archive"));
     CHECK_THROWS_WITH(readMesh(*path("empty_init_from.dae")), Catch::Contains("empty_init_from.dae: "));
 }
+}  // namespace bilayer::scene_io_test

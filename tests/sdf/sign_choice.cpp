@@ -16,7 +16,7 @@
 #include "sdf/mesh/side_classification.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::sign_choice_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -298,3 +298,4 @@ TEST_CASE("a double-sided surface is a solid if it is closed but for small holes
         }
     }
 }
+}  // namespace bilayer::sign_choice_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::sign_propagation_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -131,3 +131,4 @@ TEST_CASE("links: a sign propagates to the whole group, and one voxel is queried
     CHECK(onBothEver > 0);
     CHECK(asked > 0);
 }
+}  // namespace bilayer::sign_propagation_test

@@ -16,7 +16,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::sign_repair_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -348,3 +348,4 @@ TEST_CASE("an existing report states whether normals suffice") {
     for (auto voxel = field.grids().distance->cbeginValueOn(); voxel; ++voxel)
         REQUIRE(*voxel == unasked.grids().distance->tree().getValue(voxel.getCoord()));
 }
+}  // namespace bilayer::sign_repair_test

@@ -6,7 +6,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "box_files.h"
 
-using namespace bilayer;
+namespace bilayer::stl_reader_test {
 using namespace bilayer::test;
 
 TEST_CASE("STL: size and contents distinguish text from binary") {
@@ -47,3 +47,4 @@ TEST_CASE("STL: keywords, normals and lines may be written in any way") {
     checkBox(write("two.stl", "solid a\n" + facets.substr(0, half) + "endsolid a\n\nsolid b\n" + facets.substr(half) +
                                   "endsolid\n"));
 }
+}  // namespace bilayer::stl_reader_test

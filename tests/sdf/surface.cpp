@@ -9,8 +9,7 @@
 #include <bilayer/sdf/inspect.h>
 #include "demos/shared/shapes.h"
 
-using namespace bilayer;
-
+namespace bilayer::surface_test {
 TEST_CASE("the surface of a field is closed, outward, and where the mesh was") {
     const LevelSet field = build(shapes::sphere(1, 5), {.voxelSize = 0.03f});
     const Mesh mesh = surface(field);
@@ -31,3 +30,4 @@ TEST_CASE("other isovalues give offset surfaces") {
     CHECK_THROWS_AS(surface(field, {.isovalue = NAN}), std::invalid_argument);
     CHECK_THROWS_AS(surface(field, {.adaptivity = 2}), std::invalid_argument);
 }
+}  // namespace bilayer::surface_test

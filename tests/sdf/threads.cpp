@@ -12,8 +12,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/sdf/unsigned_band.h"
 
-using namespace bilayer;
-
+namespace bilayer::threads_test {
 TEST_CASE("the bytes do not depend on the number of threads") {
     const Mesh mesh = shapes::torusKnot(2, 3, 1, 0.2f);
     BuildOptions options{.voxelSize = voxelSizeFor(mesh, 150), .threads = 1};
@@ -55,3 +54,4 @@ TEST_CASE("many builds on a given number of threads take no more memory than a f
 }
 
 #endif
+}  // namespace bilayer::threads_test

@@ -9,8 +9,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::tile_cutter_test {
 namespace {
 
 std::vector<glm::dvec3> samples(const Tile& tile) {
@@ -205,3 +204,4 @@ TEST_CASE("a mesh far from the origin gives the same tiles, moved") {
         CHECK(a.tiles[i].offset == b.tiles[i].offset);
     }
 }
+}  // namespace bilayer::tile_cutter_test

@@ -9,7 +9,7 @@
 
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::tile_flood_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -58,3 +58,4 @@ TEST_CASE("tiles between leaves get the signs that OpenVDB's flood fill gives th
             CHECK(tree.hasSameTopology(expected));
         }
 }
+}  // namespace bilayer::tile_flood_test

@@ -23,7 +23,7 @@
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::tile_signs_test {
 using namespace bilayer::detail;
 using bilayer::test::sameFields;
 using Catch::Contains;
@@ -282,3 +282,4 @@ TEST_CASE("counts of tiles are judged as those of the whole field") {
     CHECK(verdict(2000, {1, 0}, {2, 0}) == SignVerdict::wrong);
     CHECK(verdict(2000, {1, 0}, {2, 1}) == SignVerdict::conflict);
 }
+}  // namespace bilayer::tile_signs_test

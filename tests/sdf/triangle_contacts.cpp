@@ -19,7 +19,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::triangle_contacts_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -129,3 +129,4 @@ TEST_CASE("the boundary of a union has one side of each gap, however narrow") {
         CHECK(volumeWithin(unionBoundary(shapes::join(solids))) == Approx(inspect(truthOf(flush)).volume).margin(1e-6));
     }
 }
+}  // namespace bilayer::triangle_contacts_test

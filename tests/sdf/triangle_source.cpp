@@ -15,7 +15,7 @@
 #include "sdf/tiles/triangle_source.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::triangle_source_test {
 using namespace bilayer::detail;
 using Catch::Contains;
 
@@ -140,3 +140,4 @@ TEST_CASE("triangles are sorted into one file per tile, in order") {
     CHECK(sum > 0.99 * 6 * 400 * 400);
     CHECK(sum < 3 * 6 * 400 * 400);
 }
+}  // namespace bilayer::triangle_source_test

@@ -20,7 +20,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::triangle_tree_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -279,3 +279,4 @@ TEST_CASE("sets that threads share are those of one thread") {
         CHECK(roots == count - joined);
     }
 }
+}  // namespace bilayer::triangle_tree_test

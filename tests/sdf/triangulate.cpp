@@ -14,7 +14,7 @@
 #include "sdf/sign/sign_choice.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::triangulate_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -351,3 +351,4 @@ TEST_CASE("prisms on any outline are closed and have its area for a volume") {
         CHECK(inspect(mesh).volume == Approx(0.5 * double(doubleArea(outline))));
     }
 }
+}  // namespace bilayer::triangulate_test

@@ -23,7 +23,7 @@
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
-using namespace bilayer;
+namespace bilayer::unite_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -373,3 +373,4 @@ TEST_CASE("what no union can be made of is refused") {
                     std::invalid_argument);
     CHECK_THROWS_AS(build(mesh, {.voxelSize = 0.1f, .sign = Sign::flood, .unite = true}), std::invalid_argument);
 }
+}  // namespace bilayer::unite_test

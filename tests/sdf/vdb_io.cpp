@@ -20,8 +20,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::vdb_io_test {
 namespace {
 
 LevelSet torus() {
@@ -291,3 +290,4 @@ TEST_CASE("a rotated or empty grid is no level set to us") {
     CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.clear(); })), std::invalid_argument);
     CHECK_THROWS_AS(LevelSet(std::make_shared<Grids>()), std::invalid_argument);
 }
+}  // namespace bilayer::vdb_io_test

@@ -10,8 +10,7 @@
 #include "tests/support/truth.h"
 #include "tests/support/verdict.h"
 
-using namespace bilayer;
-
+namespace bilayer::verdict_test {
 TEST_CASE("a field of true distances is judged exact, and each fault is detected") {
     const Mesh mesh = shapes::sphere(1, 2);
     const test::Truth truth(mesh);
@@ -53,3 +52,4 @@ TEST_CASE("a field of true distances is judged exact, and each fault is detected
     CHECK(faults(2.5, 2.999, [&](auto at, float) { values.setActiveState(at, false); }).missing == 1);
     CHECK(faults(-2.5, -2.001, [&](auto at, float) { values.setActiveState(at, true); }).extra == 1);
 }
+}  // namespace bilayer::verdict_test

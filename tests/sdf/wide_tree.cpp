@@ -12,7 +12,7 @@
 #include "sdf/bvh/node_list.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::wide_tree_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -134,3 +134,4 @@ TEST_CASE("narrowing keeps all nodes near the voxels and opens large ones") {
 TEST_CASE("a mesh too long for floats is refused") {
     CHECK_THROWS_AS(makeWideTree(shapes::box({1e4f, 1, 1}), 1e-3f), std::invalid_argument);
 }
+}  // namespace bilayer::wide_tree_test

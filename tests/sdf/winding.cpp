@@ -18,7 +18,7 @@
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::winding_test {
 using namespace bilayer::detail;
 
 namespace {
@@ -337,3 +337,4 @@ TEST_CASE("signs by winding number have the same bytes for any number of threads
         signByWinding(grid, mesh, {3, 3, 0.02f}, false);
     }));
 }
+}  // namespace bilayer::winding_test

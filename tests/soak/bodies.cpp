@@ -18,7 +18,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::bodies_test {
 using namespace bilayer::test;
 
 namespace {
@@ -165,3 +165,4 @@ TEST_CASE("bodies come and go: none is lost, memory does not grow, and a repetit
         REQUIRE(played(seed + round, isExtended, sleeps, 1) == first);
     });
 }
+}  // namespace bilayer::bodies_test

@@ -17,7 +17,7 @@
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
+namespace bilayer::queries_test {
 using namespace bilayer::test;
 
 namespace {
@@ -77,3 +77,4 @@ TEST_CASE("many threads query fields that are made and dropped meanwhile") {
         REQUIRE(wrong == 0);
     });
 }
+}  // namespace bilayer::queries_test

@@ -22,7 +22,7 @@ namespace {
 
 constexpr float height = 0.03f;          // amplitude of the waves, and top of the box [m]
 constexpr float cell = 0.25f;            // of the triangle mesh and the height field [m]
-constexpr int cells = 20;                // along each of their sides
+constexpr int groundCells = 20;          // along each of their sides
 constexpr float boxSide = 3;             // half of it [m]
 constexpr float fieldSide = 1.25f;       // half of it: larger than a body and its motion [m]
 constexpr float fieldDepth = 0.3f;       // below the waves [m]
@@ -39,15 +39,15 @@ float wave(float x, float y) {
 
 Mesh waves() {
     Mesh mesh;
-    const float corner = 0.5f * cell * float(cells);
-    for (int j = 0; j <= cells; ++j)
-        for (int i = 0; i <= cells; ++i) {
+    const float corner = 0.5f * cell * float(groundCells);
+    for (int j = 0; j <= groundCells; ++j)
+        for (int i = 0; i <= groundCells; ++i) {
             const float x = cell * float(i) - corner, y = cell * float(j) - corner;
             mesh.points.emplace_back(x, y, wave(x, y));
         }
-    for (int j = 0; j < cells; ++j)
-        for (int i = 0; i < cells; ++i) {
-            const auto a = unsigned(j * (cells + 1) + i), c = a + unsigned(cells) + 1;
+    for (int j = 0; j < groundCells; ++j)
+        for (int i = 0; i < groundCells; ++i) {
+            const auto a = unsigned(j * (groundCells + 1) + i), c = a + unsigned(groundCells) + 1;
             mesh.triangles.insert(mesh.triangles.end(), {{a, a + 1, c + 1}, {a, c + 1, c}});
         }
     return mesh;
@@ -70,7 +70,8 @@ std::shared_ptr<btCollisionShape> wavyHeightField() {
     for (const glm::vec3& p : waves().points) heights->push_back(p.z);
     // Bullet keeps a pointer to the heights: they are destroyed with the shape
     const std::shared_ptr<btHeightfieldTerrainShape> shape(
-        new btHeightfieldTerrainShape(cells + 1, cells + 1, heights->data(), 1.f, -height, height, 2, PHY_FLOAT, false),
+        new btHeightfieldTerrainShape(groundCells + 1, groundCells + 1, heights->data(), 1.f, -height, height, 2,
+                                      PHY_FLOAT, false),
         [heights](btHeightfieldTerrainShape* owned) { delete owned; });
     shape->setLocalScaling({cell, cell, 1});
     return shape;

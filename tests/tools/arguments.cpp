@@ -13,6 +13,7 @@
 #include "tests/tools/library.h"
 #include "tests/tools/program.h"
 
+namespace bilayer::arguments_test {
 using namespace bilayer::test;
 
 namespace {
@@ -98,3 +99,4 @@ TEST_CASE("whatever the arguments are, the program does what they say or names w
     CHECK(run({"inspect", mesh}).status == 0);
     CHECK(run({"info", field}).status == 0);
 }
+}  // namespace bilayer::arguments_test

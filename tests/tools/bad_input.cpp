@@ -9,6 +9,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
+namespace bilayer::bad_input_test {
 using namespace bilayer::test;
 
 namespace {
@@ -186,3 +187,4 @@ TEST_CASE("devices that are not there") {
                                               "--device", "no such device"}),
                  "no such device");
 }
+}  // namespace bilayer::bad_input_test

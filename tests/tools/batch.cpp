@@ -11,7 +11,7 @@
 #include "tests/tools/library.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::batch_test {
 using namespace bilayer::test;
 
 namespace fs = std::filesystem;
@@ -315,3 +315,4 @@ TEST_CASE("wrong usage of batch") {
     CHECK(absent.status == 1);
     CHECK(absent.err.find("absent.txt") != std::string::npos);
 }
+}  // namespace bilayer::batch_test

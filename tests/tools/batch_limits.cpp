@@ -13,7 +13,7 @@
 #include "tests/tools/library.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::batch_limits_test {
 using namespace bilayer::test;
 
 namespace fs = std::filesystem;
@@ -159,3 +159,4 @@ TEST_CASE("batches that overlap convert each mesh once") {
     CHECK(conversions.size() == 40);
     for (const auto& [name, count] : conversions) CHECK(count == 1);
 }
+}  // namespace bilayer::batch_limits_test

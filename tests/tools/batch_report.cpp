@@ -9,7 +9,7 @@
 #include "tests/tools/library.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::batch_report_test {
 using namespace bilayer::test;
 
 namespace fs = std::filesystem;
@@ -104,3 +104,4 @@ TEST_CASE("damaged records are counted, and missing ones are an error") {
     CHECK(none.errorLines() == 1);
     CHECK(none.err.find("nothing") != std::string::npos);
 }
+}  // namespace bilayer::batch_report_test

@@ -8,6 +8,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
+namespace bilayer::blender_test {
 using namespace bilayer::test;
 
 namespace {
@@ -68,3 +69,4 @@ TEST_CASE("Blender opens a field") {
     CHECK(found["grids"]["distance"] == "FLOAT");
     requireBall(found, {0, 0, 0});
 }
+}  // namespace bilayer::blender_test

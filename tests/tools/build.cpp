@@ -17,7 +17,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::build_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -345,3 +345,4 @@ TEST_CASE("build by prisms reports no error bound") {
     CHECK(field.grids().triangle->activeVoxelCount() == field.activeVoxels());
     CHECK(field.grids().distance->tree().getValue(openvdb::Coord(0)) < 0);
 }
+}  // namespace bilayer::build_test

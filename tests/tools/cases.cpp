@@ -15,7 +15,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::cases_test {
 using namespace bilayer::test;
 using nlohmann::json;
 
@@ -149,3 +149,4 @@ TEST_CASE("a union of overlapping solids is as large as it is") {
     CHECK(std::stod(run({"query", field}, {.input = "0.5 0.1 0.1\n"}).out) < 0);
     CHECK(run({"info", field, "--json"}).json()["mass"]["volume"].get<double>() == Approx(1.578).epsilon(1e-3));
 }
+}  // namespace bilayer::cases_test

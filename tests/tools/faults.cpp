@@ -17,7 +17,7 @@
 #include "tests/tools/library.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::faults_test {
 using namespace bilayer::test;
 
 namespace fs = std::filesystem;
@@ -191,3 +191,4 @@ TEST_CASE("without a home everything works") {
     CHECK(run(buildTo(scratch("homeless.vdb")), {.variables = {"HOME", "XDG_CACHE_HOME", "USER", "PATH", "LANG"}})
               .status == 0);
 }
+}  // namespace bilayer::faults_test

@@ -15,7 +15,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::field_test {
 using namespace bilayer::test;
 
 TEST_CASE("export writes what NanoVDB reads") {
@@ -114,3 +114,4 @@ TEST_CASE("surface returns the sphere") {
     REQUIRE(run({"surface", fieldFile(), "-o", output, "--isovalue", "0.1", "--adaptivity", "0.5"}).status == 0);
     CHECK(readMesh(output).triangles.size() < offset.triangles.size());
 }
+}  // namespace bilayer::field_test

@@ -15,7 +15,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::files_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -163,3 +163,4 @@ TEST_CASE("a reader that goes away ends a query quietly") {
     CHECK(std::system((command + " > /dev/null").c_str()) == 0);
     CHECK(std::filesystem::file_size(scratch("pipe.err")) == 0);
 }
+}  // namespace bilayer::files_test

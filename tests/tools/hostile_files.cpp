@@ -10,6 +10,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
+namespace bilayer::hostile_files_test {
 using namespace bilayer::test;
 
 namespace {
@@ -79,3 +80,4 @@ TEST_CASE("frustums within frustums are refused, however deep") {
         CHECK(r.err.find("a transform of unknown type") != std::string::npos);
     }
 }
+}  // namespace bilayer::hostile_files_test

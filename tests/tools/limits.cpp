@@ -11,7 +11,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::limits_test {
 using namespace bilayer::test;
 
 namespace {
@@ -109,3 +109,4 @@ TEST_CASE("thousands of components are one field") {
     for (std::string line; std::getline(lines, line);) inside.push_back(std::stod(line) < 0);
     CHECK(inside == std::vector<bool>{true, false, true});
 }
+}  // namespace bilayer::limits_test

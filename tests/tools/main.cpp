@@ -6,7 +6,7 @@
 
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::main_test {
 using namespace bilayer::test;
 
 TEST_CASE("help and version") {
@@ -30,3 +30,4 @@ TEST_CASE("devices reports no device") {
     CHECK(none.status == 0);
     CHECK(none.out == "no OpenCL device\n");
 }
+}  // namespace bilayer::main_test

@@ -15,7 +15,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::report_test {
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
@@ -185,3 +185,4 @@ TEST_CASE("info accepts fields of other programs") {
     CHECK(table.status == 0);
     CHECK(table.out.find("sign") == std::string::npos);
 }
+}  // namespace bilayer::report_test

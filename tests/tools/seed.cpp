@@ -12,7 +12,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::seed_test {
 using namespace bilayer::test;
 
 TEST_CASE("seed unites inputs, moves them, and adds particles") {
@@ -73,3 +73,4 @@ TEST_CASE("a liquid's volume is the same far away") {
     CHECK(volumeAt("0") == Approx(4.0 / 3.0 * 3.14159265 * 0.125).epsilon(5e-3));
     CHECK(volumeAt("1e5") == Approx(volumeAt("0")).epsilon(1e-3));
 }
+}  // namespace bilayer::seed_test

@@ -13,7 +13,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::tile_signs_test {
 using namespace bilayer::test;
 
 namespace fs = std::filesystem;
@@ -173,3 +173,4 @@ TEST_CASE("signs of open meshes are refused by name") {
     refused(fileOf(large, "large open.stl"), {"--resolution", "160", "--memory", "200"},
             "edges are not used equally often");
 }
+}  // namespace bilayer::tile_signs_test

@@ -20,7 +20,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::tiled_field_test {
 using namespace bilayer::test;
 
 namespace fs = std::filesystem;
@@ -305,3 +305,4 @@ TEST_CASE("a tile that is missing or damaged is an error that names its file") {
     fs::remove(manifest);
     CHECK_THAT(messageOf(sampleAll), Catch::Contains("manifest.json: no such file"));
 }
+}  // namespace bilayer::tiled_field_test

@@ -18,7 +18,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
-using namespace bilayer;
+namespace bilayer::tiles_test {
 using namespace bilayer::test;
 
 namespace fs = std::filesystem;
@@ -227,3 +227,4 @@ TEST_CASE("tiles refuse what needs the whole field, by name") {
     requireRefusal(tiledBuild(mesh, folder, "2x1x1", {"--voxel-size", "0.02"}), 1,
                    "holds tiles of another mesh or with other options");
 }
+}  // namespace bilayer::tiles_test

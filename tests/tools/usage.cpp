@@ -11,6 +11,7 @@
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
+namespace bilayer::usage_test {
 using namespace bilayer::test;
 
 namespace {
@@ -269,3 +270,4 @@ TEST_CASE("any words end a command in an orderly way") {
         if (r.status == 2) CHECK_FALSE(r.err.empty());
     }
 }
+}  // namespace bilayer::usage_test

@@ -14,8 +14,7 @@
 #include "sdf/fill/exact.h"
 #include "tests/support/support.h"
 
-using namespace bilayer;
-
+namespace bilayer::corpus_test {
 namespace {
 
 // The largest difference of the two fields where both have a distance [m]. Signs are left out: thin walls have those
@@ -119,3 +118,4 @@ TEST_CASE("the certificate holds for a large piece that is nearly parallel to sm
         verify(mesh, {.voxelSize = 1});
     }
 }
+}  // namespace bilayer::corpus_test

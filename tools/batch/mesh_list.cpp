@@ -27,7 +27,7 @@ bool isMesh(const fs::directory_entry& entry) {
     return std::find(meshEndings.begin(), meshEndings.end(), ending) != meshEndings.end() && !entry.is_directory();
 }
 
-std::string nameOf(const fs::path& file) {
+std::string meshName(const fs::path& file) {
     const fs::path normal = file.lexically_normal();
     const bool isInside = normal.is_relative() && !normal.empty() && *normal.begin() != "..";
     return isInside ? normal.generic_string() : fs::absolute(file).lexically_normal().relative_path().generic_string();
@@ -65,7 +65,7 @@ std::vector<fs::path> pathsInList(const fs::path& list) {
 
 std::vector<BatchMesh> meshesOf(const std::vector<fs::path>& files) {
     std::vector<BatchMesh> meshes;
-    for (const fs::path& file : files) meshes.push_back({file, nameOf(file)});
+    for (const fs::path& file : files) meshes.push_back({file, meshName(file)});
     return meshes;
 }
 

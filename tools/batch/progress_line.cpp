@@ -11,7 +11,7 @@ namespace bilayer::tools {
 namespace {
 
 constexpr std::chrono::milliseconds interval{100};  // smooth, and no load on a slow terminal
-constexpr const char* clearLine = "\r\033[K";
+constexpr const char* clearProgress = "\r\033[K";
 
 std::string duration(double seconds) {
     const long long s = static_cast<long long>(seconds + 0.5);
@@ -24,7 +24,7 @@ std::string duration(double seconds) {
 ProgressLine::ProgressLine() : visible_(::isatty(STDERR_FILENO)) {}
 
 ProgressLine::~ProgressLine() {
-    if (visible_) fmt::print(stderr, "{}", clearLine);
+    if (visible_) fmt::print(stderr, "{}", clearProgress);
 }
 
 void ProgressLine::show(const BatchCounts& counts) {
@@ -33,8 +33,8 @@ void ProgressLine::show(const BatchCounts& counts) {
     drawn_ = now;
     const double rate = double(counts.finished()) / std::chrono::duration<double>(now - start_).count();
     const std::string left = rate > 0 ? duration(double(counts.total - counts.finished()) / rate) : "?";
-    fmt::print(stderr, "{}{} of {} meshes, {} failed, {:.3g}/s, {} left", clearLine, counts.finished(), counts.total,
-               counts.failed, rate, left);
+    fmt::print(stderr, "{}{} of {} meshes, {} failed, {:.3g}/s, {} left", clearProgress, counts.finished(),
+               counts.total, counts.failed, rate, left);
     std::fflush(stderr);
 }
 

@@ -46,7 +46,7 @@ void printText(const std::filesystem::path& root, const BatchSummary& summary, s
     printLookAt(summary);
 }
 
-Json toJson(const BatchSummary& summary, std::size_t damagedLines) {
+Json summaryJson(const BatchSummary& summary, std::size_t damagedLines) {
     Json histograms = Json::object(), lookAt = Json::array();
     for (const LogHistogram& histogram : summary.histograms) {
         Json bins = Json::array();
@@ -68,7 +68,7 @@ void reportBatch(const BatchFolder& folder, bool json) {
     const RecordList list = readRecords(folder.records());
     const BatchSummary summary = summaryOf(list.records);
     writeText(folder.root() / "report.html", reportPage(folder, list.records, summary));
-    if (json) return print(toJson(summary, list.damagedLines));
+    if (json) return print(summaryJson(summary, list.damagedLines));
     printText(folder.root(), summary, list.damagedLines);
 }
 

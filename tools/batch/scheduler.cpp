@@ -36,7 +36,7 @@ struct RunningMesh {
 };
 
 /// Moves what a worker has made to its place. Returns an error, or nothing.
-std::string place(const fs::path& from, const fs::path& to) {
+std::string moveTo(const fs::path& from, const fs::path& to) {
     std::error_code error;
     fs::create_directories(to.parent_path(), error);
     if (!error) fs::rename(from, to, error);
@@ -158,7 +158,7 @@ class Scheduler {
         std::error_code absent;
         fs::rename(work / workThumbnail, plan_.folder.thumbnail(mesh.name), absent);
         if (known["outcome"] == "done")
-            if (const std::string error = place(work / workField, plan_.folder.field(mesh.name)); !error.empty())
+            if (const std::string error = moveTo(work / workField, plan_.folder.field(mesh.name)); !error.empty())
                 known.update(Json{{"outcome", "failed"}, {"reason", "error"}, {"error", error}});
         clean(mesh);
         if (known["outcome"] == "large") {

@@ -11,8 +11,8 @@
 namespace bilayer::tools {
 namespace {
 
-constexpr double outlierFactor = 10;                 // times the median
-constexpr double slowSeconds = 1, largeBytes = 1e8;  // smaller outliers hurt nobody
+constexpr double outlierFactor = 10;                  // times the median
+constexpr double slowSeconds = 1, largeMemory = 1e8;  // smaller outliers hurt nobody
 
 // The step of a histogram below a value: 1 or 3 times a power of ten.
 double stepBelow(double value) {
@@ -72,7 +72,7 @@ std::string oddity(const Json& record, const Medians& medians) {
                 if (note.is_string()) reasons.push_back(note);
     if (seconds > slowSeconds && seconds > outlierFactor * medians.seconds)
         reasons.push_back(fmt::format("took {:.3g} s, the median is {:.3g} s", seconds, medians.seconds));
-    if (bytes > largeBytes && bytes > outlierFactor * medians.bytes)
+    if (bytes > largeMemory && bytes > outlierFactor * medians.bytes)
         reasons.push_back(fmt::format("took {:.0f} MB, the median is {:.0f} MB", bytes / 1e6, medians.bytes / 1e6));
     return fmt::format("{}", fmt::join(reasons, "; "));
 }

@@ -18,7 +18,7 @@ namespace bilayer::tools {
 using namespace bilayer::detail;
 namespace {
 
-constexpr double mib = 1 << 20;
+constexpr double bytesPerMib = 1 << 20;
 /// Memory to read a mesh whole, per byte of its file, and the program without it [bytes]. The largest factor is
 /// that of binary files.
 constexpr double bytesPerFileByte = 6, bytesOfReader = 120e6;
@@ -64,7 +64,7 @@ SignedSource MeshSort::open(int round) const {
     throw std::runtime_error(fmt::format(
         "{}: reading it whole needs about {:.0f} MiB, and {:.0f} MiB are given; a binary STL file, or a binary PLY "
         "file of triangles with float coordinates, is not read whole",
-        a_.mesh.string(), whole / mib, budget_ / mib));
+        a_.mesh.string(), whole / bytesPerMib, budget_ / bytesPerMib));
 }
 
 void MeshSort::requireRoomToOrient(std::size_t triangles, double whole) const {
@@ -73,7 +73,7 @@ void MeshSort::requireRoomToOrient(std::size_t triangles, double whole) const {
     throw std::runtime_error(
         fmt::format("{}: the sign auto must orient this mesh, which needs about {:.0f} MiB, and {:.0f} MiB are given; "
                     "allow more, or take another sign",
-                    a_.mesh.string(), need / mib, budget_ / mib));
+                    a_.mesh.string(), need / bytesPerMib, budget_ / bytesPerMib));
 }
 
 }  // namespace bilayer::tools

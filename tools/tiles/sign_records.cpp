@@ -10,7 +10,7 @@ namespace bilayer::tools {
 using namespace bilayer::detail;
 namespace {
 
-const char* nameOf(NormalsCheck check) {
+const char* checkName(NormalsCheck check) {
     return check == NormalsCheck::none ? "none" : check == NormalsCheck::count ? "count" : "correct";
 }
 
@@ -18,7 +18,7 @@ NormalsCheck checkOf(const std::string& name) {
     return name == "count" ? NormalsCheck::count : name == "correct" ? NormalsCheck::correct : NormalsCheck::none;
 }
 
-Json toJson(const SignRepair& repair) {
+Json repairJson(const SignRepair& repair) {
     return {{"wrong", repair.repaired}, {"contradictory", repair.refused}};
 }
 
@@ -32,7 +32,7 @@ Json toJson(const PlannedSigns& planned) {
     const PartSigns& signs = planned.signs;
     return {{"method", detail::nameOf(signs.method)},
             {"reason", signs.reason},
-            {"check", nameOf(signs.check)},
+            {"check", checkName(signs.check)},
             {"name", signs.name.empty() ? detail::nameOf(signs.method) : signs.name},
             {"round", planned.round}};
 }
@@ -52,8 +52,8 @@ PlannedSigns plannedSigns(const Json& json) {
 Json toJson(const SignCounts& counts) {
     return {{"conflicts", counts.conflicts},
             {"leaves", counts.compared.leaves},
-            {"everyFifthColumn", toJson(counts.compared.everyFifth)},
-            {"allColumns", toJson(counts.compared.all)}};
+            {"everyFifthColumn", repairJson(counts.compared.everyFifth)},
+            {"allColumns", repairJson(counts.compared.all)}};
 }
 
 SignCounts signCounts(const Json& json) {

@@ -25,7 +25,7 @@ constexpr float restSpeed = 0.05f, releaseSpeed = 0.15f, pushSpeed = 0.05f;
 constexpr int pushSteps = 4;
 // Rounding limit, relative: of positions in single precision to their size, of rotations [rad], and of forces to the
 // weight.
-constexpr float rounding = 4 * std::numeric_limits<float>::epsilon();
+constexpr float restRounding = 4 * std::numeric_limits<float>::epsilon();
 
 bool isDynamic(const btCollisionObject& object) {
     return btRigidBody::upcast(&object) && !object.isStaticOrKinematicObject();
@@ -34,7 +34,7 @@ bool isDynamic(const btCollisionObject& object) {
 // Whether a force other than its weight acts.
 bool isForced(const btRigidBody& body) {
     const btVector3 weight = body.getGravity() / body.getInvMass() * body.getLinearFactor();
-    return body.getTotalForce().distance(weight) > rounding * weight.length() || !body.getTotalTorque().isZero();
+    return body.getTotalForce().distance(weight) > restRounding * weight.length() || !body.getTotalTorque().isZero();
 }
 
 // Bullet applies no gravity to bodies that it wakes within a step.
@@ -67,9 +67,10 @@ bool comesFrom(const btTransform& place, const btRigidBody& body, float seconds)
     btTransformUtil::integrateTransform(place, body.getLinearVelocity(), body.getAngularVelocity(), seconds, expected);
     const btTransform& now = body.getWorldTransform();
     const float size = std::max(now.getOrigin().length(), expected.getOrigin().length());
-    if (!(now.getOrigin().distance(expected.getOrigin()) <= rounding * size)) return false;
+    if (!(now.getOrigin().distance(expected.getOrigin()) <= restRounding * size)) return false;
     for (int axis = 0; axis < 3; ++axis)
-        if (!(now.getBasis().getColumn(axis).distance(expected.getBasis().getColumn(axis)) <= rounding)) return false;
+        if (!(now.getBasis().getColumn(axis).distance(expected.getBasis().getColumn(axis)) <= restRounding))
+            return false;
     return true;
 }
 

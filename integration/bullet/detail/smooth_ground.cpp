@@ -29,7 +29,7 @@ namespace {
 // block touches several edges at once and rocks; its later impacts remove the rotation that earlier ones caused.
 constexpr float maxEnergyRatio = 4;
 // A body that is slower along the ground than this may be at rest [speeds that gravity adds in a step].
-constexpr float restSpeed = 2;
+constexpr float groundRestSpeed = 2;
 // Approach velocities below this fraction of the speed along the ground are rounding.
 constexpr float minSlope = 1e-3f;
 // Maximum change of a body's kinetic energy in a step, relative.
@@ -136,7 +136,7 @@ float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& g
         const btVector3 along = before->linear - normal.dot(before->linear) * normal;
         const FacetImpact impact{point.m_appliedImpulse, normal.dot(before->at(place)), normal.dot(after.at(place)),
                                  along.length(), body.computeImpulseDenominator(place, normal) / body.getInvMass()};
-        if (impact.speed < restSpeed * seconds * body.getGravity().length()) continue;
+        if (impact.speed < groundRestSpeed * seconds * body.getGravity().length()) continue;
         if (!(std::abs(impact.before) > minSlope * impact.speed)) continue;
         const float own = edgeAngleOf(body, bodyIsFirst ? point.m_localPointA : point.m_localPointB);
         loss += impact.loss(edgeAngleUnder(ground) + (own > 0 ? own + rotation : 0));

@@ -17,7 +17,7 @@ void print(const char* message) {
     fmt::print(stderr, "bilayer: {}\n", message);
 }
 
-std::mutex mutex;  // guards what follows
+std::mutex warningMutex;  // guards what follows
 WarningCallback current = print;
 std::set<const char*>& given() {
     static std::set<const char*>& all = *new std::set<const char*>;  // never destroyed: shapes may outlive it
@@ -27,7 +27,7 @@ std::set<const char*>& given() {
 }  // namespace
 
 WarningCallback setWarningCallback(WarningCallback callback) {
-    const std::lock_guard lock(mutex);
+    const std::lock_guard lock(warningMutex);
     given().clear();
     return std::exchange(current, callback ? callback : print);
 }
@@ -35,7 +35,7 @@ WarningCallback setWarningCallback(WarningCallback callback) {
 void detail::warn(const char* message) {
     WarningCallback callback;
     {
-        const std::lock_guard lock(mutex);
+        const std::lock_guard lock(warningMutex);
         callback = current;
     }
     callback(message);
@@ -43,7 +43,7 @@ void detail::warn(const char* message) {
 
 void detail::warnOnce(const char* message) {
     {
-        const std::lock_guard lock(mutex);
+        const std::lock_guard lock(warningMutex);
         if (!given().insert(message).second) return;
     }
     warn(message);

@@ -40,7 +40,7 @@ using Leaf = FloatTree::LeafNodeType;
 constexpr const char* byFlood = "flood";  // LevelSet::sign() of a mesh whose winding numbers are of no use
 
 constexpr float minFieldWidthVoxels = 1;  // [field voxels] on either side; a narrower band does not define the surface
-constexpr float rounding = 1e-5f;         // tolerance of a width that is a whole number of voxels
+constexpr float widthTolerance = 1e-5f;   // tolerance of a width that is a whole number of voxels
 constexpr double sameVoxels = 1e-6;       // relative tolerance of equal voxel sizes
 constexpr double maxHoleWidthVoxels = 2;  // [voxels]; wider holes are not closed
 constexpr double spareWidth = 1e-3;       // relative: what other voxels may change in a width by rounding
@@ -106,7 +106,8 @@ bool fits(const LevelSet& field, const Placement& placement, const Transform& vo
         return (voxels.worldToIndex({moved.x, moved.y, moved.z}) - index).length() <= sameVoxels;
     };
     return placement.scale == glm::vec3(1) && coincides({0, 0, 0}) && coincides({1, 0, 0}) && coincides({0, 1, 0}) &&
-           coincides({0, 0, 1}) && std::min(field.exteriorWidth(), field.interiorWidth()) >= width * (1 - rounding);
+           coincides({0, 0, 1}) &&
+           std::min(field.exteriorWidth(), field.interiorWidth()) >= width * (1 - widthTolerance);
 }
 
 void requireCubes(const Transform& voxels) {
@@ -216,7 +217,7 @@ FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const T
     checkPlacement(placement);
     requireCubes(voxels);
     if (std::min(field.exteriorWidth(), field.interiorWidth()) <
-        minFieldWidthVoxels * field.voxelSize() * (1 - rounding))
+        minFieldWidthVoxels * field.voxelSize() * (1 - widthTolerance))
         throw std::invalid_argument("the field's band is narrower than a voxel");
     if (fits(field, placement, voxels, width)) {
         const auto grid = moved(*field.grids().distance, Coord(0), 1, width);

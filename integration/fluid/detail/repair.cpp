@@ -37,7 +37,7 @@ constexpr std::size_t manyBroken = 20;
 // If single voxels cannot be repaired, the surface is smoothed around them, by a larger radius each time [voxels].
 constexpr int maxSmoothings = 12, firstRadius = 2;
 // Distances below the accuracy of exact ones [voxels].
-constexpr float rounding = 1e-4f;
+constexpr float repairRounding = 1e-4f;
 // Constraints aim this far inside the range, so that the iteration ends.
 constexpr float rangeMargin = 0.02f;
 constexpr float maxChange = 0.25f;       // maximum change by one constraint [voxels]: the limit of the linearisation
@@ -49,8 +49,8 @@ constexpr int maxProjections = 100;  // maximum rounds over all constraints
 constexpr int idleProjections = 30;  // rounds without a gain before other methods are used
 constexpr int maxRounds = 60;        // rounds of descent; about six are enough for real meshes
 constexpr int idleRounds = 3;        // rounds without a gain before the surroundings are smoothed
-constexpr float reportedChange = 0.1f - rounding;  // a change that is reported [voxels]
-constexpr int stencilReach = 3;                    // radius of the WENO stencil along the axes [voxels]
+constexpr float reportedChange = 0.1f - repairRounding;  // a change that is reported [voxels]
+constexpr int stencilReach = 3;                          // radius of the WENO stencil along the axes [voxels]
 // Changes that are tried at a voxel, in both directions [voxels].
 constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
 constexpr float stepCost = 1e-3f;  // prefers small changes among equally good ones
@@ -83,7 +83,7 @@ bool isCrossed(const FloatGrid::ConstAccessor& values, const Coord& voxel, float
 // If a flat face passes through voxels, rounding would decide the signs at its edges. Voxels on it therefore get a
 // distance of 0.
 void snapToSurface(FloatGrid& grid) {
-    const float tolerance = rounding * float(grid.voxelSize()[0]);
+    const float tolerance = repairRounding * float(grid.voxelSize()[0]);
     openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
     leaves.foreach ([tolerance](openvdb::FloatTree::LeafNodeType& leaf, std::size_t) {
         for (auto voxel = leaf.beginValueOn(); voxel; ++voxel)
