@@ -17,6 +17,7 @@
 #include "integration/fluid/detail/placement.h"
 #include "integration/fluid/detail/regrid.h"
 #include "sdf/base/openvdb_points.h"
+#include "sdf/base/progress.h"
 
 namespace bilayer::fluid {
 
