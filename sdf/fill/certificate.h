@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the proof obligations of the exact method in double precision (docs/method.md, "Certificate"). They are
+// Checks the proof obligations of the exact method in double precision (docs/exactness.md, "Certificate"). They are
 // asserted for every voxel of a build where the library is compiled with BILAYER_VERIFY; builds then take some ten
 // times as long.
 //
