@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Branch and bound over pairs of nodes, nearest pair first, as E. Larsen, S. Gottschalk, M. Lin, D. Manocha, "Fast
 // distance queries with rectangular swept sphere volumes", ICRA 2000. Oriented boxes replace their swept rectangles:
-// pieces of surfaces that face each other are flat in them, so that their bounds are tight. Highway compiles it once
-// for each instruction set.
+// pieces of surfaces that face each other are flat in them, so that their bounds are tight. The search ends early if
+// two planes across the direction of the closest pair separate the meshes: then none is closer, as between convex
+// bodies. Highway compiles it once for each instruction set.
 #include "collider/contact/mesh_distance.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -18,6 +19,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "collider/contact/node_heights.h"
 #include "collider/contact/posed_tree.h"
 #include "collider/contact/triangle_distance_lanes.h"
 
@@ -28,10 +30,12 @@ namespace {
 
 /// Pairs that are nearer by less are not looked for [sizes of the meshes]. Boxes are rounded to floats outward.
 constexpr double tolerance = 3e-7;
-/// Stack size: each of the two trees has at most ten levels, and a level leaves at most seven pending pairs.
-constexpr std::size_t maxPending = 160;
 /// Rounds of projection from one mesh to the other for a first bound.
 constexpr int projections = 4;
+/// Planes are tried after so many opened nodes without a closer pair, which would come with other planes.
+constexpr int patience = 8;
+/// Planes seldom separate nodes that are larger than this [distances of the closest pair].
+constexpr double maxSeparated = 4;
 
 // Lower bounds of the squared distances from a box to the boxes of a group: the largest of the distances of their
 // bounds in either frame and along a direction, which points from the group to the box. Returns the slots whose bound
@@ -182,6 +186,7 @@ class PairSearch {
     }
 
     const MeshDistance& run() {
+        if (areSeparated(rootA_, rootB_)) return best_;
         stack_[pending_++] = {0, rootA_, rootB_};
         while (pending_ > 0) {
             const NodePair pair = stack_[--pending_];
@@ -190,6 +195,10 @@ class PairSearch {
             if (leafA && leafB) {
                 measureLeaves(pair.a.index, pair.b.index);
                 continue;
+            }
+            if (!leafA && !leafB && ++sinceCloser_ > patience) {
+                if (sinceCloser_ == patience + 1 && areSeparated(rootA_, rootB_)) return best_;
+                if (areSmall(pair) && areSeparated(pair.a, pair.b)) continue;
             }
             if (leafB || (!leafA && a_.size2Of(pair.a) >= b_.size2Of(pair.b)))
                 open(a_, pair.a.index, b_.boundsOf(pair.b), -direction_,
@@ -206,6 +215,15 @@ class PairSearch {
         double bound2;
         PosedNode a, b;
     };
+
+    // Whether planes across the direction of the closest pair show that no pair of triangles below two nodes is closer.
+    bool areSeparated(const PosedNode& a, const PosedNode& b) {
+        return direction_ != glm::dvec3(0) && heightsA_.of(a_, a.index) + heightsB_.of(b_, b.index) >= limit_;
+    }
+
+    bool areSmall(const NodePair& pair) const {
+        return std::min(a_.size2Of(pair.a), b_.size2Of(pair.b)) < maxSeparated * maxSeparated * limit2_;
+    }
 
     // Replaces a node by its children that may be near the other one, the nearest last.
     template <class MakePair>
@@ -249,8 +267,15 @@ class PairSearch {
         const TrianglePair pair = closestPoints(cornersA, cornersB);
         if (!(pair.distance2 <= best_.distance * best_.distance)) return;
         best_ = {a, b, pair.a, pair.b, std::sqrt(pair.distance2)};
-        if (best_.distance > margin_) direction_ = (pair.a.position - pair.b.position) / best_.distance;
+        if (best_.distance > margin_) setDirection((pair.a.position - pair.b.position) / best_.distance);
+        sinceCloser_ = 0;
         setLimit();
+    }
+
+    void setDirection(const glm::dvec3& direction) {
+        direction_ = direction;
+        heightsA_.setDirection(direction);
+        heightsB_.setDirection(-direction);
     }
 
     void setLimit() {
@@ -264,9 +289,11 @@ class PairSearch {
     double margin_, limit_, limit2_;
     MeshDistance best_;
     glm::dvec3 direction_{0};  // of the closest pair, from B to A: triangles are no closer than along it
+    NodeHeights heightsA_, heightsB_;  // along it, and against it
+    int sinceCloser_ = 0;              // nodes opened since the closest pair was found
     LeafCache leavesA_, leavesB_;
     std::size_t pending_ = 0;
-    std::array<NodePair, maxPending> stack_;
+    std::array<NodePair, 2 * PosedTree::maxPending> stack_;
 };
 
 MeshDistance search(const MeshTree& a, const MeshTree& b, const Similarity& aToB, double maxDistance,

@@ -66,6 +66,9 @@ struct LeafTriangles {
 /// again.
 class PosedTree {
   public:
+    /// The size of a stack for a traversal: at most ten levels, each of which leaves at most seven pending nodes.
+    static constexpr std::size_t maxPending = 80;
+
     PosedTree(const MeshTree& mesh, const Similarity& map) : mesh_(mesh), map_(map) {
         ofFrame_.fill(nullptr);
         unit_ = map.scale * double(mesh.voxelSize());
@@ -108,6 +111,17 @@ class PosedTree {
             return linear_[0] * double(p.x) + linear_[1] * double(p.y) + (linear_[2] * double(p.z) + map_.shift);
         };
         return {posed(mesh.points[t.x]), posed(mesh.points[t.y]), posed(mesh.points[t.z])};
+    }
+
+    /// The least height of the triangles of a leaf along a direction of the common frame.
+    double leastHeight(std::uint32_t leaf, const glm::dvec3& direction) const {
+        const Mesh& mesh = mesh_.mesh();
+        const glm::dvec3 inMesh = direction * linear_;
+        double least = std::numeric_limits<double>::infinity();
+        for (const std::uint32_t triangle : tree().leaves[leaf].triangles)
+            for (int k = 0; k < 3; ++k)
+                least = std::min(least, glm::dot(inMesh, glm::dvec3(mesh.points[mesh.triangles[triangle][k]])));
+        return least + glm::dot(direction, map_.shift);
     }
 
     /// The triangle nearest to a point of the common frame, and its closest point.
