@@ -288,7 +288,7 @@ class PairSearch {
     PosedNode rootA_, rootB_;
     double margin_, limit_, limit2_;
     MeshDistance best_;
-    glm::dvec3 direction_{0};  // of the closest pair, from B to A: triangles are no closer than along it
+    glm::dvec3 direction_{0};          // of the closest pair, from B to A: triangles are no closer than along it
     NodeHeights heightsA_, heightsB_;  // along it, and against it
     int sinceCloser_ = 0;              // nodes opened since the closest pair was found
     LeafCache leavesA_, leavesB_;
