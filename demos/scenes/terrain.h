@@ -20,8 +20,8 @@ struct TerrainOptions {
 };
 
 /// Criteria, after a quarter of a second in which bodies settle:
-/// - The speed of each body is that of a frictionless point with constant energy, within 2 %. A body that rolls has a
-///   constant share of its kinetic energy in its rotation.
+/// - The speed of each body is that of a frictionless point with constant energy, within 2 %. It is computed from the
+///   kinetic energy, of which bodies that turn or roll have a part in their rotation.
 /// - No contact normal is more than 5 degrees outside of the normals of the triangles around it.
 /// - No body penetrates the ground by half a voxel.
 /// - Energy never rises by 1 %.

@@ -56,7 +56,12 @@ btRigidBody& World::add(std::shared_ptr<btCollisionShape> shape, const Matter& m
 }
 
 void World::step(float seconds) {
+    lastStep_ = seconds;
     world_.stepSimulation(seconds, 1, seconds);
+}
+
+btVector3 World::middleOfStep(const btRigidBody& body) const {
+    return body.getCenterOfMassPosition() - 0.5f * lastStep_ * body.getLinearVelocity();
 }
 
 std::vector<Pose> World::poses() const {
@@ -90,7 +95,8 @@ double World::potentialEnergy() const {
     for (const Body& entry : bodies_) {
         const btRigidBody& body = *entry.body;
         if (body.isStaticOrKinematicObject()) continue;
-        const btVector3 &g = body.getGravity(), &at = body.getWorldTransform().getOrigin();
+        const btVector3& g = body.getGravity();
+        const btVector3 at = middleOfStep(body);
         for (int axis = 0; axis < 3; ++axis) energy -= double(g[axis]) * at[axis] / double(body.getInvMass());
     }
     return energy;

@@ -54,7 +54,13 @@ class World {
     int moving() const;
     int asleep() const;
 
-    /// Sums over all dynamic bodies, asleep or not; potential energy is 0 at the origin [J].
+    /// Where the centre of mass was in the middle of the last step. Bullet moves a body through the whole step by the
+    /// velocity at its end, so this is the position that belongs to the velocity: in free fall, energy is constant
+    /// with it, and off by half of the weight's work in a step with the position at the end.
+    btVector3 middleOfStep(const btRigidBody& body) const;
+
+    /// Sums over all dynamic bodies, asleep or not, in the middle of the last step; potential energy is 0 at the
+    /// origin [J].
     double kineticEnergy() const;
     double potentialEnergy() const;
 
@@ -74,6 +80,7 @@ class World {
     btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
     bullet::WorldExtensions extensions_;
     std::vector<Body> bodies_;
+    float lastStep_ = 0;  // [s]
 };
 
 }  // namespace bilayer::demo
