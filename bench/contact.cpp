@@ -131,14 +131,22 @@ class Boxes {
     BoxForm box_;
 };
 
+// The median of the second half of the steps.
+double ofLaterSteps(const std::vector<double>& values) {
+    return median({values.begin() + std::ptrdiff_t(values.size() / 2), values.end()});
+}
+
 // A row of a table.
 struct Row {
     std::string name;
     double made;  // [s]
     PileRun run;
 
-    double step() const {
-        return median({run.stepMs.begin() + std::ptrdiff_t(run.stepMs.size() / 2), run.stepMs.end()});
+    double step() const { return ofLaterSteps(run.stepMs); }
+    double part(double StepParts::*which) const {
+        std::vector<double> values;
+        for (const StepParts& parts : run.parts) values.push_back(parts.*which);
+        return ofLaterSteps(values);
     }
     double penetration(double share) const { return 1e3 * demo::percentile(run.penetrations, share); }  // [mm]
     double restEnergy() const {
@@ -215,15 +223,19 @@ Growth grow(const Options& options) {
     pile.seconds = options.growSeconds;
     Growth growth;
     fmt::print("\n## How the cost grows: {:g} s of knots\n\n", pile.seconds);
-    fmt::print("| bodies | voxels | a step [ms] | a step and body [ms] | 99 % of penetrations [voxels] |\n");
-    fmt::print("|---|---|---|---|---|\n");
+    fmt::print(
+        "| bodies | voxels | a step [ms] | a step and body [ms] | broad phase [ms] | contacts [ms] | solver [ms] | "
+        "contact points a body | 99 % of penetrations [voxels] |\n");
+    fmt::print("|---|---|---|---|---|---|---|---|---|\n");
     const auto measure = [&](int bodies, float voxels) {
         const auto field = makeField(mesh, voxels);
         PileOptions how = pile;
         if (bodies > 100) how.measuredFrames = 4;  // a thousand bodies have thousands of pairs
         const Row row = playKnots(*field, mesh, bodies, how);
         const double deep = 1e-3 * row.penetration(0.99) * double(voxels) / double(knotSize);
-        fmt::print("| {} | {:g} | {:.2f} | {:.3f} | {:.3f} |\n", bodies, voxels, row.step(), row.step() / bodies, deep);
+        fmt::print("| {} | {:g} | {:.2f} | {:.3f} | {:.2f} | {:.2f} | {:.2f} | {:.1f} | {:.3f} |\n", bodies, voxels,
+                   row.step(), row.step() / bodies, row.part(&StepParts::broadPhase), row.part(&StepParts::contacts),
+                   row.part(&StepParts::solver), row.part(&StepParts::points) / bodies, deep);
         std::fflush(stdout);
         return row.step();
     };

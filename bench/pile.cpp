@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "bench/measure.h"
 #include "demos/shared/world.h"
@@ -32,6 +33,57 @@ btVector3 inertiaOf(const Member& member) {
     const glm::vec3 inertia = of.principalInertia * float(double(member.mass) / of.volume);
     return {inertia.x, inertia.y, inertia.z};
 }
+
+// Bullet's world, which measures the parts of a step.
+class MeasuredWorld : public btDiscreteDynamicsWorld {
+  public:
+    using btDiscreteDynamicsWorld::btDiscreteDynamicsWorld;
+
+    void updateAabbs() override {
+        const Timed part(last_.broadPhase);
+        btDiscreteDynamicsWorld::updateAabbs();
+    }
+    void computeOverlappingPairs() override {
+        const Timed part(last_.broadPhase);
+        btDiscreteDynamicsWorld::computeOverlappingPairs();
+    }
+    void performDiscreteCollisionDetection() override {
+        const Timed part(last_.contacts);
+        btDiscreteDynamicsWorld::performDiscreteCollisionDetection();
+    }
+    void calculateSimulationIslands() override {
+        const Timed part(last_.solver);
+        btDiscreteDynamicsWorld::calculateSimulationIslands();
+    }
+    void solveConstraints(btContactSolverInfo& info) override {
+        const Timed part(last_.solver);
+        btDiscreteDynamicsWorld::solveConstraints(info);
+    }
+
+    // The parts since the last call.
+    StepParts takeParts() {
+        StepParts parts = std::exchange(last_, {});
+        parts.contacts -= parts.broadPhase;  // which is a part of it
+        for (int i = 0; i < getDispatcher()->getNumManifolds(); ++i)
+            parts.points += getDispatcher()->getManifoldByIndexInternal(i)->getNumContacts();
+        return parts;
+    }
+
+  private:
+    // Adds the milliseconds of its life.
+    class Timed {
+      public:
+        explicit Timed(double& sum) : sum_(sum) {}
+        ~Timed() { sum_ += 1e3 * watch_.seconds(); }
+        Timed(const Timed&) = delete;
+        Timed& operator=(const Timed&) = delete;
+
+      private:
+        double& sum_;
+        Stopwatch watch_;
+    };
+    StepParts last_;
+};
 
 // Bullet's world with the bodies of one run.
 class Arena {
@@ -55,6 +107,7 @@ class Arena {
     Arena& operator=(const Arena&) = delete;
 
     void step(float seconds) { world_.stepSimulation(seconds, 1, seconds); }
+    StepParts takeParts() { return world_.takeParts(); }
 
     std::vector<Pose> poses() const {
         std::vector<Pose> all;
@@ -91,7 +144,7 @@ class Arena {
     std::unique_ptr<btCollisionDispatcher> dispatcher_;
     btDbvtBroadphase broadphase_;
     btSequentialImpulseConstraintSolver solver_;
-    btDiscreteDynamicsWorld world_;
+    MeasuredWorld world_;
     std::vector<std::unique_ptr<btRigidBody>> bodies_;
 };
 
@@ -133,6 +186,7 @@ PileRun play(const Rival& rival, const std::vector<Member>& members, const PileO
         const Stopwatch watch;
         arena.step(1 / options.stepsPerSecond);
         run.stepMs.push_back(1e3 * watch.seconds());
+        run.parts.push_back(arena.takeParts());
         run.kineticEnergy.push_back(arena.kineticEnergy());
         if (i % between == 0) frames.push_back(arena.poses());
     }

@@ -37,9 +37,18 @@ struct PileOptions {
     int measuredFrames = 40;
 };
 
+/// Where the time of a step goes [ms], and what it is spent on.
+struct StepParts {
+    double broadPhase = 0;  ///< boxes, and the pairs whose boxes overlap
+    double contacts = 0;    ///< of these pairs, until Bullet's manifolds hold them
+    double solver = 0;      ///< Bullet's, with its islands
+    double points = 0;      ///< count of contact points in the manifolds
+};
+
 /// Result of a run.
 struct PileRun {
     std::vector<double> stepMs;         ///< time of each step [ms]
+    std::vector<StepParts> parts;       ///< of each step
     std::vector<double> kineticEnergy;  ///< after each step [J]
     std::vector<double> penetrations;   ///< overlapping pairs in the measured frames, by the meshes [m]
     int awakeBodies = 0;                ///< bodies at the end that are too fast to fall asleep

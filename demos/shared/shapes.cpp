@@ -11,8 +11,6 @@
 namespace bilayer::shapes {
 namespace {
 
-constexpr float halfTurn = glm::pi<float>();
-
 // Two triangles for the quadrilateral a b c d, counter-clockwise.
 void addQuad(Mesh& mesh, unsigned a, unsigned b, unsigned c, unsigned d) {
     mesh.triangles.push_back({a, b, c});
@@ -44,7 +42,7 @@ glm::vec2 onDisc(const glm::vec2& square) {
     const bool flat = std::abs(square.x) >= std::abs(square.y);
     const float r = flat ? square.x : square.y;
     if (r == 0) return {0, 0};
-    const float turn = halfTurn / 4 * (flat ? square.y : square.x) / r;
+    const float turn = glm::pi<float>() / 4 * (flat ? square.y : square.x) / r;
     return flat ? glm::vec2(r * std::cos(turn), r * std::sin(turn)) : glm::vec2(r * std::sin(turn), r * std::cos(turn));
 }
 
@@ -63,7 +61,7 @@ float pattern(float a, float b) {
 float wallRadius(float angle, float rise) {
     const float foot = 1 - smoothStep(0.03f, 0.06f, rise), lid = smoothStep(0.72f, 0.75f, rise);
     const float body = pattern(12 * angle + 20 * rise, 12 * angle - 20 * rise) * window(0.12f, 0.65f, 0.03f, rise);
-    const float beads = pattern(24 * angle, 8 * halfTurn * (rise - 0.805f)) * window(0.82f, 0.92f, 0.02f, rise);
+    const float beads = pattern(24 * angle, 8 * glm::pi<float>() * (rise - 0.805f)) * window(0.82f, 0.92f, 0.02f, rise);
     return bodyRadius + (footRadius - bodyRadius) * foot + (lidRadius - bodyRadius) * lid - wallDepth * (body + beads);
 }
 
@@ -131,9 +129,9 @@ void addStrip(Mesh& mesh, unsigned low, int lowCount, float lowTurn, unsigned hi
 // A unit sphere of vertex rings between two poles. The count of vertices of each ring keeps triangles similar.
 Mesh ringedSphere(std::size_t triangles) {
     const float height =
-        std::sqrt(std::sqrt(3.f) * 4 * halfTurn / float(triangles));  // height of an equilateral triangle
-    const int rings = std::max(3, int(std::lround(halfTurn / height)) - 1);
-    const auto slope = [&](int ring) { return halfTurn * float(ring + 1) / float(rings + 1); };
+        std::sqrt(std::sqrt(3.f) * 4 * glm::pi<float>() / float(triangles));  // height of an equilateral triangle
+    const int rings = std::max(3, int(std::lround(glm::pi<float>() / height)) - 1);
+    const auto slope = [&](int ring) { return glm::pi<float>() * float(ring + 1) / float(rings + 1); };
     float sines = 0;
     for (int i = 0; i < rings; ++i) sines += std::sin(slope(i));
     std::vector<int> counts;
@@ -151,7 +149,7 @@ Mesh ringedSphere(std::size_t triangles) {
         begins.push_back(unsigned(mesh.points.size()));
         const float across = std::sin(slope(int(ring))), up = -std::cos(slope(int(ring)));
         for (int i = 0; i < counts[ring]; ++i) {
-            const float angle = 2 * halfTurn * (float(i) + turn(ring)) / float(counts[ring]);
+            const float angle = glm::two_pi<float>() * (float(i) + turn(ring)) / float(counts[ring]);
             mesh.points.push_back({across * std::cos(angle), across * std::sin(angle), up});
         }
     }
@@ -246,7 +244,8 @@ Mesh torus(float major, float minor, int around, int across) {
     Mesh mesh;
     for (int i = 0; i < around; ++i)
         for (int j = 0; j < across; ++j) {
-            const float u = 2 * halfTurn * float(i) / float(around), v = 2 * halfTurn * float(j) / float(across);
+            const float u = glm::two_pi<float>() * float(i) / float(around),
+                        v = glm::two_pi<float>() * float(j) / float(across);
             const float r = major + minor * std::cos(v);
             mesh.points.push_back({r * std::cos(u), r * std::sin(u), minor * std::sin(v)});
         }
@@ -256,7 +255,7 @@ Mesh torus(float major, float minor, int around, int across) {
 
 Mesh torusKnot(int p, int q, float radius, float thickness, int along, int across) {
     const auto curve = [&](float s) {
-        const float u = 2 * halfTurn * float(p) * s, v = 2 * halfTurn * float(q) * s;
+        const float u = glm::two_pi<float>() * float(p) * s, v = glm::two_pi<float>() * float(q) * s;
         const float r = radius * (1.f + 0.4f * std::cos(v));
         return glm::vec3(r * std::cos(u), r * std::sin(u), 0.4f * radius * std::sin(v));
     };
@@ -269,7 +268,7 @@ Mesh torusKnot(int p, int q, float radius, float thickness, int along, int acros
         const glm::vec3 side = glm::normalize(glm::cross(tangent, glm::vec3(centre.x, centre.y, 0)));
         const glm::vec3 up = glm::cross(side, tangent);
         for (int j = 0; j < across; ++j) {
-            const float w = 2 * halfTurn * float(j) / float(across);
+            const float w = glm::two_pi<float>() * float(j) / float(across);
             mesh.points.push_back(centre + thickness * (std::cos(w) * side + std::sin(w) * up));
         }
     }
@@ -282,7 +281,7 @@ Mesh revolve(const std::vector<glm::vec2>& profile, int segments) {
     const int count = int(profile.size());
     for (int i = 0; i < segments; ++i)
         for (const auto& point : profile) {
-            const float u = 2 * halfTurn * float(i) / float(segments);
+            const float u = glm::two_pi<float>() * float(i) / float(segments);
             mesh.points.push_back({point.x * std::cos(u), point.x * std::sin(u), point.y});
         }
     // poles become equal points at all angles, and weld() removes the triangles that collapse there
@@ -317,7 +316,7 @@ Mesh bowl(float radius, float wall, int segments, float opening, float foot) {
     }
     const glm::vec2 outward = at(1, opening), onward(-outward.y, outward.x);
     for (int i = 1; i < rim; ++i) {  // over the round rim
-        const float angle = halfTurn * float(i) / float(rim);
+        const float angle = glm::pi<float>() * float(i) / float(rim);
         profile.push_back(middle * outward + wall / 2 * (std::cos(angle) * outward + std::sin(angle) * onward));
     }
     for (int i = arc; i >= 0; --i) profile.push_back(at(inner, opening * float(i) / float(arc)));  // inside, back down
@@ -327,7 +326,7 @@ Mesh bowl(float radius, float wall, int segments, float opening, float foot) {
 Mesh carvedBox(std::size_t triangles, float radius) {
     if (triangles < 100) throw std::invalid_argument("a carved box has at least 100 triangles");
     // 4 n^2 triangles on the caps, 8 n m on the wall, whose cells are square: 2 pi around, 2 halfHeight up
-    const float upPerAcross = 4 * 2 * carved::halfHeight / (2 * halfTurn);
+    const float upPerAcross = 4 * 2 * carved::halfHeight / (glm::two_pi<float>());
     const int n = int(std::lround(std::sqrt(double(triangles) / (4 + 8 * double(upPerAcross)))));
     const CubeGrid grid{n, int(std::lround((double(triangles) / (4 * n) - n) / 2))};
 

@@ -139,7 +139,7 @@ OrientedGroups orientedGroups(const Mesh& mesh, const BoxTree& boxes, const Larg
                 const Leaves own{leaves, i * all, std::min((i + 1) * all, leaves.size()), lastLeaf};
                 visit(result.groups[first + i], own, each);
             };
-            forAllPolled(count, progress, visitGroup, grain);
+            forAllPolled(count, grain, progress, visitGroup);
             first += count;
             each = all;
         }

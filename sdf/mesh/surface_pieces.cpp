@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/mesh/surface_pieces.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <glm/common.hpp>
 #include <span>
 #include <utility>
 
-#include "sdf/base/progress.h"
+#include "sdf/base/polled_loop.h"
 
 namespace bilayer::detail {
 namespace {
@@ -20,14 +18,6 @@ double largestCoordinate(const Mesh& mesh) {
     const Bounds box = bounds(mesh);
     const glm::vec3 largest = glm::max(glm::abs(box.lower), glm::abs(box.upper));
     return double(std::max({largest.x, largest.y, largest.z}));
-}
-
-template <class Work>
-void forEachPolled(std::size_t count, Progress* progress, const Work& work) {
-    tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
-        poll(progress);
-        work(i);
-    });
 }
 
 }  // namespace
@@ -42,7 +32,7 @@ SurfacePieces::SurfacePieces(const Mesh& mesh, double slack, Progress* progress)
       patchLabels_(mesh.triangles.size(), 0),
       cuts_(mesh.triangles.size()) {
     const TriangleContacts contacts(mesh, topology_, tree_, slack_);
-    forEachPolled(contacts_.size(), progress, [&](std::size_t i) { contacts_[i] = contacts.within(unsigned(i)); });
+    forAllPolled(contacts_.size(), 1, progress, [&](std::size_t i) { contacts_[i] = contacts.within(unsigned(i)); });
     touched_ = std::any_of(contacts_.begin(), contacts_.end(), [](const auto& segments) { return !segments.empty(); });
     findPatches();
 }
@@ -83,11 +73,11 @@ void SurfacePieces::label(const LabelOf& labelOf) {
     const auto labelAt = [&](const glm::dvec3& place, const glm::dvec3& normal) {
         return labelOf(sides.at(place, slack_ * normal));
     };
-    forEachPolled(patches_.size(), progress_, [&](std::size_t p) {
+    forAllPolled(patches_.size(), 1, progress_, [&](std::size_t p) {
         const DoubleTriangle largest = face(patches_[p]);
         patchLabels_[patches_[p]] = largest.area > 0 ? labelAt(largest.centroid(), largest.normal) : withoutArea;
     });
-    forEachPolled(contacts_.size(), progress_, [&](std::size_t i) {
+    forAllPolled(contacts_.size(), 1, progress_, [&](std::size_t i) {
         if (contacts_[i].empty()) return;
         const DoubleTriangle triangle = face(i);
         cuts_[i] = cut(triangle.polygon(), triangle.normal, contacts_[i], slack_,

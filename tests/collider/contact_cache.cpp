@@ -11,7 +11,7 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/contacts.h"
-#include "tests/support/random.h"
+#include "tests/support/random_pose.h"
 #include "tests/support/support.h"
 
 namespace bilayer::contact_cache_test {
@@ -44,10 +44,6 @@ bool sameBytes(const std::vector<Contact>& a, const std::vector<Contact>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Contact)) == 0;
 }
 
-Pose randomPose(Random& random) {
-    return {random.point(0.45), glm::angleAxis(float(random(0, 6.28)), random.direction())};
-}
-
 // A step of a random walk: translation and rotation up to `size`.
 void stroll(Pose& pose, Random& random, float size) {
     pose.position += 0.7f * random.point(double(size));
@@ -63,8 +59,8 @@ TEST_CASE("contacts are the same with what was kept of the steps before, however
     std::size_t found = 0;
     long tested = 0, testedAnew = 0;
     for (int walk = 0; walk < 60; ++walk) {
-        Placed a{walk % 2 ? knot() : brick(), randomPose(random), walk % 3 ? 1.f : 1.7f},
-            b{walk % 4 < 2 ? knot() : brick(), randomPose(random), walk % 5 ? 1.f : 0.6f};
+        Placed a{walk % 2 ? knot() : brick(), randomPose(random, 0.45), walk % 3 ? 1.f : 1.7f},
+            b{walk % 4 < 2 ? knot() : brick(), randomPose(random, 0.45), walk % 5 ? 1.f : 0.6f};
         const ContactOptions options{.margin = h * float(walk % 4) / 2};
         ContactCache near;
         for (int step = 0; step < 40; ++step) {

@@ -15,7 +15,7 @@
 #include "collider/contact/triangle_distance.h"
 #include "demos/shared/shapes.h"
 #include "surface_distance.h"
-#include "tests/support/random.h"
+#include "tests/support/random_pose.h"
 #include "tests/support/support.h"
 
 namespace bilayer::distance_test {
@@ -28,11 +28,6 @@ constexpr double exactness = 1e-6;  // promised error of distances [sizes of the
 
 Collider colliderOf(const Mesh& mesh, float resolution = 48) {
     return Collider(mesh, build(mesh, {.voxelSize = voxelSizeFor(mesh, resolution)}));
-}
-
-Pose poseWithin(Random& random, double reach) {
-    const glm::vec3 axis = random.direction();
-    return {random.point(reach), glm::angleAxis(float(random(0, 6.28)), axis)};
 }
 
 double sizeOf(const Placed& body) {
@@ -114,8 +109,8 @@ TEST_CASE("Bodies are as far apart as their triangles") {
         CAPTURE(i);
         const auto body = [&] { return std::size_t(random(0, double(bodies.size()) - 1e-9)); };
         const double reach = std::pow(10, random(-0.5, 3));
-        const Placed a{bodies[body()], poseWithin(random, reach), float(random(0.2, 3))},
-            b{bodies[body()], poseWithin(random, reach), float(random(0.2, 3))};
+        const Placed a{bodies[body()], randomPose(random, reach), float(random(0.2, 3))},
+            b{bodies[body()], randomPose(random, reach), float(random(0.2, 3))};
         separated += checkSeparated(a, b);
     }
     CHECK(separated > 200);
@@ -134,8 +129,8 @@ TEST_CASE("Meshes of the corpus are as far apart as their triangles", "[corpus]"
         CAPTURE(i);
         const std::size_t first = std::size_t(i) % bodies.size(), second = std::size_t(i / 2) % bodies.size();
         const double size = double(bodies[first].bounds().longestSide());
-        const Placed a{bodies[first], poseWithin(random, size)},
-            b{bodies[second], poseWithin(random, size),
+        const Placed a{bodies[first], randomPose(random, size)},
+            b{bodies[second], randomPose(random, size),
               bodies[first].bounds().longestSide() / bodies[second].bounds().longestSide()};
         separated += checkSeparated(a, b);
     }
@@ -149,7 +144,7 @@ TEST_CASE("A start changes the speed of a distance, not the distance") {
     const Collider torus = colliderOf(shapes::torus(0.5f, 0.15f)),
                    knot = colliderOf(shapes::torusKnot(2, 3, 0.5f, 0.1f));
     DistanceStart start;
-    Pose pose = poseWithin(random, 1);
+    Pose pose = randomPose(random, 1);
     pose.position.x = 1.5f;
     for (int i = 0; i < 300; ++i) {
         CAPTURE(i);
@@ -172,7 +167,7 @@ TEST_CASE("Swapped bodies are as far apart, with the opposite normal") {
     const Collider torus = colliderOf(shapes::torus(0.5f, 0.15f)), cone = colliderOf(shapes::cone(0.4f, 1, 24));
     for (int i = 0; i < 200; ++i) {
         CAPTURE(i);
-        const Placed a{torus, poseWithin(random, 1)}, b{cone, poseWithin(random, 1), 0.7f};
+        const Placed a{torus, randomPose(random, 1)}, b{cone, randomPose(random, 1), 0.7f};
         const BodyDistance one = distance(a, b), other = distance(b, a);
         CHECK((one.overlap == Overlap::aInsideB) == (other.overlap == Overlap::bInsideA));
         CHECK((one.overlap == Overlap::surfaces) == (other.overlap == Overlap::surfaces));
@@ -224,7 +219,7 @@ TEST_CASE("Overlapping bodies have the depth of the deepest point") {
         // a ball on a face of the block, and the same turned together; its deepest point is nearer to that face than
         // to any other
         const float depth = float(random(0.01, 0.4)), aside = 0.45f - depth;
-        const Pose frame = poseWithin(random, 1);
+        const Pose frame = randomPose(random, 1);
         const glm::vec3 at(float(random(-aside, aside)), float(random(-aside, aside)), 1 - depth);
         const Placed a{ball, {frame.toWorld(at), frame.rotation}}, b{block, frame};
         const BodyDistance answer = distance(a, b);
@@ -255,8 +250,8 @@ TEST_CASE("Fine meshes at a small distance are as far apart as their triangles")
     int separated = 0;
     for (int i = 0; i < 10; ++i) {
         CAPTURE(i);
-        const Placed a{body, poseWithin(random, 0.1)};
-        Placed b{body, poseWithin(random, 0.1)};
+        const Placed a{body, randomPose(random, 0.1)};
+        Placed b{body, randomPose(random, 0.1)};
         b.pose.position += 3.f * random.direction();
         for (int k = 0; k < 8; ++k) {
             const BodyDistance here = distance(a, b);

@@ -17,7 +17,7 @@
 #include "collider/contact/gjk.h"
 #include "demos/shared/shapes.h"
 #include "surface_distance.h"
-#include "tests/support/random.h"
+#include "tests/support/random_pose.h"
 #include "tests/support/support.h"
 
 namespace bilayer::shape_distance_test {
@@ -130,10 +130,6 @@ double bruteForce(const Subject& subject, const PlacedShape& placed, const Place
     return best * double(placed.scale);
 }
 
-Pose poseWithin(Random& random, double distance) {
-    return {float(distance) * random.direction(), glm::angleAxis(float(random(0, 3)), random.direction())};
-}
-
 Collider colliderOf(const Mesh& mesh) {
     return {mesh, build(mesh, {.voxelSize = bounds(mesh).longestSide() / 48})};
 }
@@ -157,8 +153,8 @@ TEST_CASE("The distance of a shape from a collider is that of brute force, with 
             const Collider& collider = colliders()[std::size_t(round % 3)];
             const ContactShape field(collider);
             const double size = 0.5 + 0.5 * (round % 4), away = round % 2 ? random(0.3, 1.5) : random(1, 30);
-            const PlacedShape a{subject.shape, poseWithin(random, away), float(random(0.5, 2))};
-            const PlacedShape b{field, poseWithin(random, 0.2), float(size)};
+            const PlacedShape a{subject.shape, randomPoseAt(random, away), float(random(0.5, 2))};
+            const PlacedShape b{field, randomPoseAt(random, 0.2), float(size)};
             const Placed body{collider, b.pose, b.scale};
             CAPTURE(subject.name, round);
             const double expected = bruteForce(subject, a, body);
@@ -203,7 +199,7 @@ TEST_CASE("Shapes that overlap a collider are distinguished from those inside it
     const ContactShape field(block);
     for (const Subject& subject : subjects()) {
         CAPTURE(subject.name);
-        const Pose pose = poseWithin(random, 2);
+        const Pose pose = randomPoseAt(random, 2);
         const PlacedShape b{field, pose};
         // inside
         const BodyDistance inside = distance({subject.shape, pose, 0.2f}, b);
@@ -247,7 +243,7 @@ TEST_CASE("Planes and sheets of triangles have the distance of the lowest vertex
     }};
     for (int round = 0; round < 30; ++round) {
         const Collider& collider = colliders()[std::size_t(round % 3)];
-        const Pose world = poseWithin(random, 3), local = poseWithin(random, 0);
+        const Pose world = randomPoseAt(random, 3), local = randomPoseAt(random, 0);
         const auto height = float(round % 3 ? random(0.8, 5) : random(-0.3, 0.3)), scale = float(random(0.5, 2));
         const Pose pose{world.toWorld({0, 0, height}), world.rotation * local.rotation};
         const PlacedShape b{ContactShape(collider), pose, scale};
@@ -287,8 +283,8 @@ TEST_CASE("Moving shapes touch a collider when samples of their motion say so") 
     int hits = 0;
     for (const Subject& subject : subjects())
         for (int round = 0; round < 8; ++round) {
-            PlacedShape a{subject.shape, poseWithin(random, 3)};
-            const PlacedShape b{field, poseWithin(random, 0)};
+            PlacedShape a{subject.shape, randomPoseAt(random, 3)};
+            const PlacedShape b{field, randomPoseAt(random, 0)};
             a.motion = {-1.5f * a.pose.position + 0.7f * random.direction(), float(random(0, 5)) * random.direction()};
             CAPTURE(subject.name, round);
             const Impact impact = timeOfImpact(a, b);

@@ -15,7 +15,7 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "surface_distance.h"
-#include "tests/support/random.h"
+#include "tests/support/random_pose.h"
 #include "tests/support/support.h"
 
 namespace bilayer::time_of_impact_test {
@@ -47,10 +47,6 @@ TriangleSheet squareSheet() {
     }};
 }
 
-Pose poseWithin(Random& random, float distance) {
-    return {distance * random.direction(), glm::angleAxis(float(random(0, 3)), random.direction())};
-}
-
 }  // namespace
 
 TEST_CASE("Moving bodies touch when samples of their motion say so, and never pass through each other") {
@@ -62,8 +58,8 @@ TEST_CASE("Moving bodies touch when samples of their motion say so, and never pa
     int hits = 0, misses = 0;
     // one round in nine misses, so a few seeds need more rounds
     for (int round = 0; round < 150 || (misses <= 10 && round < 300); ++round) {
-        Placed a{shapes[round % 3], poseWithin(random, 0), float(random(0.5, 2))};
-        Placed b{shapes[round / 3 % 3], poseWithin(random, 3), float(random(0.5, 2))};
+        Placed a{shapes[round % 3], randomPoseAt(random, 0), float(random(0.5, 2))};
+        Placed b{shapes[round / 3 % 3], randomPoseAt(random, 3), float(random(0.5, 2))};
         // towards each other, some at many sizes a step, so that they meet, graze, or miss
         const float far = random(0, 1) < 0.3 ? 40.f : 6.f;
         b.motion = {-far / 3 * (b.pose.position + 0.7f * random.direction()), float(random(0, 6)) * random.direction()};

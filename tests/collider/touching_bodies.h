@@ -11,7 +11,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/analytic.h"
 #include "tests/support/contacts.h"
-#include "tests/support/random.h"
+#include "tests/support/random_pose.h"
 
 namespace bilayer::test {
 
@@ -43,10 +43,6 @@ inline std::vector<Contact> contactsOf(const Placed& a, const Placed& b, float m
     const ContactReport seen = collide(a, b, unfiltered(margin), contacts);
     if (report) *report = seen;
     return contacts;
-}
-
-inline Pose randomPose(Random& random, double reach) {
-    return {random.point(reach), glm::angleAxis(float(random(0, 6.28)), random.direction())};
 }
 
 // Pairs of bodies in contact: one is moved until the other's surface is near its own.
