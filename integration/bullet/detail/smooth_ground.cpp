@@ -26,8 +26,9 @@ namespace bilayer::bullet::detail {
 namespace {
 
 // Impacts up to this multiple of the energy that edges of the ground and of the body can take from it are given back. A
-// block touches several edges at once and rocks; its later impacts remove the rotation that earlier ones caused.
-constexpr float maxEnergyRatio = 4;
+// block touches several edges at once and rocks, and a ball hops from facet to facet: their later impacts take what
+// earlier ones caused.
+constexpr float maxEnergyRatio = 6;
 // A body that is slower along the ground than this may be at rest [speeds that gravity adds in a step].
 constexpr float groundRestSpeed = 2;
 // Approach velocities below this fraction of the speed along the ground are rounding.
@@ -100,6 +101,11 @@ float FacetImpact::loss(float angle) const {
     return -0.5f * impulse * (before + after) * std::min(ratio * ratio, 1.f);
 }
 
+float FacetFriction::loss(float angle) const {
+    const float tangent = std::tan(angle);
+    return before.length() < tangent * tangent * speed ? -0.5f * impulse.dot(before + after) : 0;
+}
+
 void SmoothGround::beforeStep() {
     before_.clear();
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
@@ -133,13 +139,22 @@ float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& g
         if (!(point.m_appliedImpulse > 0)) continue;
         const btVector3 place = bodyIsFirst ? point.getPositionWorldOnA() : point.getPositionWorldOnB();
         const btVector3 normal = (bodyIsFirst ? 1.f : -1.f) * point.m_normalWorldOnB;
-        const btVector3 along = before->linear - normal.dot(before->linear) * normal;
-        const FacetImpact impact{point.m_appliedImpulse, normal.dot(before->at(place)), normal.dot(after.at(place)),
-                                 along.length(), body.computeImpulseDenominator(place, normal) / body.getInvMass()};
+        const auto along = [&](const btVector3& v) { return v - normal.dot(v) * normal; };
+        const btVector3 pointBefore = before->at(place), pointAfter = after.at(place);
+        const FacetImpact impact{point.m_appliedImpulse, normal.dot(pointBefore), normal.dot(pointAfter),
+                                 along(before->linear).length(),
+                                 body.computeImpulseDenominator(place, normal) / body.getInvMass()};
         if (impact.speed < groundRestSpeed * seconds * body.getGravity().length()) continue;
         if (!(std::abs(impact.before) > minSlope * impact.speed)) continue;
         const float own = edgeAngleOf(body, bodyIsFirst ? point.m_localPointA : point.m_localPointB);
-        loss += impact.loss(edgeAngleUnder(ground) + (own > 0 ? own + rotation : 0));
+        const float angle = edgeAngleUnder(ground) + (own > 0 ? own + rotation : 0);
+        loss += impact.loss(angle);
+        if (!(own > 0)) continue;
+        const btVector3 friction = point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
+                                   point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2;
+        loss +=
+            FacetFriction{(bodyIsFirst ? 1.f : -1.f) * friction, along(pointBefore), along(pointAfter), impact.speed}
+                .loss(angle);
     }
     return loss;
 }

@@ -27,6 +27,19 @@ struct FacetImpact {
     float loss(float angle) const;
 };
 
+/// The friction of a body at a contact with a triangle of the ground, in one step.
+struct FacetFriction {
+    btVector3 impulse;        ///< on the body [N s]
+    btVector3 before, after;  ///< velocities of the contact point along the triangle, as those of FacetImpact [m/s]
+    float speed;              ///< of the body's centre along the triangle, before the step [m/s]
+
+    /// The energy that the friction takes from a body that rolls over edges whose angles sum to this [J]; 0 for a body
+    /// that slips by more than that causes. The contact point is off the ideal one by up to the angle, so it moves
+    /// along the triangle at speed * (1 - cos(angle)), and impacts that far from the centre change the rotation by as
+    /// much.
+    float loss(float angle) const;
+};
+
 /// Gives bodies back what shallow edges of the ground and their own take: ExtensionOptions::smoothGround.
 class SmoothGround {
   public:
