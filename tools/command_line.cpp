@@ -56,6 +56,18 @@ bool hasEmptyWord(int count, char** arguments) {
     return false;
 }
 
+// Returns whether the first word should be a command and is none, and reports it.
+bool isUnknownCommand(const CLI::App& app, const std::string& word) {
+    std::string names;
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+        if (command->get_name() == word) return false;
+        names += (names.empty() ? "" : ", ") + command->get_name();
+    }
+    std::fprintf(stderr, "there is no command '%s'; the commands are %s\n", bilayer::tools::printable(word).c_str(),
+                 names.c_str());
+    return true;
+}
+
 int flushOutput() {
     if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return done;
     return complain("cannot write to standard output: " + std::generic_category().message(errno));
@@ -70,6 +82,7 @@ void bilayer::tools::prepareProcess() {
 
 int bilayer::tools::runCommandLine(CLI::App& app, int count, char** arguments) {
     if (hasEmptyWord(count, arguments)) return usage;
+    if (count > 1 && *arguments[1] != '-' && isUnknownCommand(app, arguments[1])) return usage;
     try {
         app.parse(count, arguments);
         return flushOutput();

@@ -33,6 +33,8 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_show_copyright = False
+html_show_search_summary = False  # its texts are fetched, which browsers refuse for files
+pygments_dark_style = "default"  # pages have one theme: Debian's Furo has no dark page
 
 breathe_projects = {"bilayer": str(XML)}
 breathe_default_project = "bilayer"

@@ -38,7 +38,8 @@ TEST_CASE("wrong usage") {
     requireUsage({"build", mesh, "-o", rejectedOutput(), "--voxel-size", "0.1", "--mapping", "group"},
                  "need --backend opencl");
     requireUsage({});
-    requireUsage({"unknown"});
+    requireUsage({"unknown"}, "there is no command 'unknown'; the commands are build, ");
+    requireUsage({mesh}, "there is no command '" + mesh);
     requireUsage({"build"});
     requireUsage({"build", mesh, "--voxel-size", "0.1"});
     requireUsage(rejectedBuild(mesh, {}));
