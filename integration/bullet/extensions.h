@@ -55,7 +55,7 @@ struct ExtensionOptions {
     ///
     /// - Edges whose faces differ by less than 20 degrees count: the sharpest one of the ground below, the sharpest
     ///   one of the body's own triangle at the contact, and for a body with such edges its rotation in a step. Impacts
-    ///   get back up to six times the energy that an edge with the sum of these angles can take at the body's speed.
+    ///   get back up to eight times the energy that an edge with the sum of these angles can take at the body's speed.
     ///   So a drop on the ground is an impact as usual, and a flat floor gives nothing back to a box.
     /// - A body that rolls also gets back what friction takes at such impacts: where its contact point slips by no more
     ///   than they cause, which is the square of the sum's tangent, in parts of the speed. Friction that brakes a

@@ -28,7 +28,7 @@ namespace {
 // Impacts up to this multiple of the energy that edges of the ground and of the body can take from it are given back. A
 // block touches several edges at once and rocks, and a ball hops from facet to facet: their later impacts take what
 // earlier ones caused.
-constexpr float maxEnergyRatio = 6;
+constexpr float maxEnergyRatio = 8;
 // A body that is slower along the ground than this may be at rest [speeds that gravity adds in a step].
 constexpr float groundRestSpeed = 2;
 // Approach velocities below this fraction of the speed along the ground are rounding.
