@@ -58,7 +58,7 @@ BlockMask borderVoxels(const BlockBox& own, const glm::ivec3& block) {
 }
 
 void writeBorder(const std::filesystem::path& path, const FloodBorder& border, const std::string& distancesHash) {
-    RecordWriter record;
+    HashedRecordWriter record;
     record.add(std::vector<char>(distancesHash.begin(), distancesHash.end()));
     record.add(border.own);
     record.add(border.open);
@@ -74,7 +74,7 @@ void writeBorder(const std::filesystem::path& path, const FloodBorder& border, c
 }
 
 FloodBorder readBorder(const std::filesystem::path& path, std::string* distancesHash) {
-    RecordReader record(path);
+    HashedRecordReader record(path);
     const auto hash = record.values<char>();
     if (distancesHash) distancesHash->assign(hash.begin(), hash.end());
     FloodBorder border;
@@ -93,7 +93,7 @@ FloodBorder readBorder(const std::filesystem::path& path, std::string* distances
 }
 
 void writeArrivals(const std::filesystem::path& path, const BorderArrivals& arrivals) {
-    RecordWriter record;
+    HashedRecordWriter record;
     record.add(arrivals.round);
     record.add(arrivals.all);
     record.write(path);
@@ -106,7 +106,7 @@ std::uint32_t readRound(const std::filesystem::path& path) {
 }
 
 BorderArrivals readArrivals(const std::filesystem::path& path) {
-    RecordReader record(path);
+    HashedRecordReader record(path);
     BorderArrivals arrivals;
     arrivals.round = record.value<std::uint32_t>();
     arrivals.all = record.values<BorderArrival>();

@@ -12,7 +12,7 @@
 
 namespace bilayer::detail {
 
-void RecordWriter::write(const std::filesystem::path& path) const {
+void HashedRecordWriter::write(const std::filesystem::path& path) const {
     AtomicFile file(path);
     const std::uint64_t hash = contentHash(bytes_);
     std::ofstream stream(file.temporary(), std::ios::binary | std::ios::trunc);
@@ -23,7 +23,7 @@ void RecordWriter::write(const std::filesystem::path& path) const {
     file.commit();
 }
 
-RecordReader::RecordReader(const std::filesystem::path& path) : path_(path) {
+HashedRecordReader::HashedRecordReader(const std::filesystem::path& path) : path_(path) {
     requireInputFile(path);
     std::uint64_t hash = 0;
     const std::uintmax_t size = std::filesystem::file_size(path);
@@ -35,7 +35,7 @@ RecordReader::RecordReader(const std::filesystem::path& path) : path_(path) {
     if (!stream || hash != contentHash(bytes_)) fail();
 }
 
-void RecordReader::fail() const {
+void HashedRecordReader::fail() const {
     throw std::runtime_error(fmt::format("{}: is damaged: repeat the command, which writes it again", path_.string()));
 }
 

@@ -15,7 +15,7 @@
 namespace bilayer::detail {
 
 /// Collects values, and writes them as one file.
-class RecordWriter {
+class HashedRecordWriter {
   public:
     template <class Value>
     void add(const Value& value) {
@@ -38,10 +38,10 @@ class RecordWriter {
 };
 
 /// Returns the values of a file in the order in which they were added.
-class RecordReader {
+class HashedRecordReader {
   public:
     /// Throws std::runtime_error that names the file if it cannot be read or its bytes do not have their hash.
-    explicit RecordReader(const std::filesystem::path& path);
+    explicit HashedRecordReader(const std::filesystem::path& path);
 
     template <class Value>
     Value value() {

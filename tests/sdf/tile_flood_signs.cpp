@@ -312,9 +312,9 @@ TEST_CASE("files of borders that are damaged are found") {
     CHECK_THROWS_WITH(readArrivals(path), Contains("tile.by_distance: is damaged"));
     std::filesystem::resize_file(path, 5);
     CHECK_THROWS_WITH(readArrivals(path), Contains("is damaged"));
-    RecordWriter record;
+    HashedRecordWriter record;
     record.add(std::uint64_t(1) << 60);
     record.write(path);
-    CHECK_THROWS_WITH(RecordReader(path).values<int>(), Contains("is damaged"));
+    CHECK_THROWS_WITH(HashedRecordReader(path).values<int>(), Contains("is damaged"));
 }
 }  // namespace bilayer::tile_flood_signs_test

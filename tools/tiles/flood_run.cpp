@@ -70,14 +70,14 @@ FloodBorder FloodRun::borderOf(std::size_t tile) const {
 }
 
 void FloodRun::join() const {
-    RecordWriter record;
+    HashedRecordWriter record;
     for (const RegionSides& sides : joinRegions(tiling_, [this](std::size_t tile) { return borderOf(tile); }))
         record.add(sides);
     record.write(folder_.regions());
 }
 
 void FloodRun::readSides() {
-    RecordReader record(folder_.regions());
+    HashedRecordReader record(folder_.regions());
     sides_.clear();
     for (std::size_t tile = 0; tile < tiling_.size(); ++tile) sides_.push_back(record.values<std::uint8_t>());
     load_.bytes += record.size();
