@@ -176,7 +176,7 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
         signPartByWinding(*distance_, mesh, widths, *part_, enclosesSurface(options_), progress_);
     else if (sign == Sign::winding)
         signByWinding(*distance_, solids, widths, balanced(solids, &progress_), &progress_);
-    if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gapVoxels, widths, &progress_);
+    if (sign == Sign::flood && !part_) signByFlood(*distance_, mesh, options_.gapVoxels, widths, &progress_);
     if (byNormals) conflicts += assembler.conflicts(*distance_);
     signs_ = {nameOf(sign), reason, conflicts, undecided};
     if (byNormals && part_ && part_->signs.check != NormalsCheck::none)

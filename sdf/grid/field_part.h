@@ -24,7 +24,7 @@ enum class NormalsCheck { none, count, correct };
 
 /// How the parts of a field find their signs. This is decided once, for all of them.
 struct PartSigns {
-    Sign method = Sign::normals;      ///< or `winding`, of a closed mesh
+    Sign method = Sign::normals;      ///< or `winding`, of a closed mesh, or `flood`, which leaves distances unsigned
     std::string reason = asAskedFor;  ///< as chooseSign() states it
     std::string name{};               ///< of the method in the metadata; empty: that of `method`
     NormalsCheck check = NormalsCheck::none;

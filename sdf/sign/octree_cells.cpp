@@ -97,8 +97,7 @@ BlockMask across(const BlockMask& mask, int axis, int side) {
     return result;
 }
 
-BlockMask farther(const BandLeaf& leaf, float limit) {
-    const float* distances = leaf.buffer().data();
+BlockMask farther(const float* distances, float limit) {
     BlockMask mask{};
     for (std::size_t x = 0; x < blockSide; ++x)
         for (unsigned i = 0; i < 64; ++i) mask[x] |= std::uint64_t(distances[x * 64 + i] > limit) << i;
@@ -135,13 +134,17 @@ std::vector<BandLeaf*> leavesOf(openvdb::FloatGrid& grid) {
 
 void assemble(openvdb::FloatGrid& grid, const std::vector<openvdb::CoordBBox>& inside, const BandWidths& widths,
               Progress* progress) {
-    const float exterior = widths.exterior * widths.voxelSize, interior = widths.interior * widths.voxelSize;
+    assemble(grid, inside, widths.exterior * widths.voxelSize, -widths.interior * widths.voxelSize, progress);
+}
+
+void assemble(openvdb::FloatGrid& grid, const std::vector<openvdb::CoordBBox>& inside, float exterior, float interior,
+              Progress* progress) {
     const auto tree = std::make_shared<openvdb::FloatTree>(exterior);
     openvdb::tree::ValueAccessor<openvdb::FloatTree> access(*tree);
     std::vector<BandLeaf*> leaves;
     grid.tree().stealNodes(leaves);
     for (BandLeaf* leaf : leaves) access.addLeaf(leaf);
-    for (const std::size_t i : Polled(inside.size(), progress)) tree->sparseFill(inside[i], -interior, false);
+    for (const std::size_t i : Polled(inside.size(), progress)) tree->sparseFill(inside[i], interior, false);
     poll(progress);
     openvdb::tools::prune(*tree);
     grid.setTree(tree);

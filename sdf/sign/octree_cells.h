@@ -64,8 +64,8 @@ inline void set(BlockMask& mask, unsigned voxel) {
 /// neighbour across that face has its adjacent voxels.
 BlockMask across(const BlockMask& mask, int axis, int side);
 
-/// Returns the voxels of a leaf that are farther from the surface than `limit` [m].
-BlockMask farther(const BandLeaf& leaf, float limit);
+/// Returns the voxels of a leaf whose distances are larger than `limit` [m].
+BlockMask farther(const float* distances, float limit);
 
 /// Signs an unsigned leaf. Voxels with -interior < distance < exterior are active; others hold +exterior or -interior.
 void signLeaf(BandLeaf& leaf, const BlockMask& inside, const BandWidths& widths);
@@ -78,6 +78,9 @@ std::vector<BandLeaf*> leavesOf(openvdb::FloatGrid& grid);
 /// inactive value becomes a tile.
 /// @param progress  polled for cancellation, unless null; if it throws, the grid has lost its leaves
 void assemble(openvdb::FloatGrid& grid, const std::vector<openvdb::CoordBBox>& inside, const BandWidths& widths,
+              Progress* progress = nullptr);
+/// The same with the values of space [m].
+void assemble(openvdb::FloatGrid& grid, const std::vector<openvdb::CoordBBox>& inside, float exterior, float interior,
               Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

@@ -25,6 +25,12 @@ constexpr double tileBytesPerTriangle = 240;
 constexpr double bytesPerColumn = 12;
 /// Memory per block: a leaf, its place in the tree, its compressed form, and the bytes of the file [bytes].
 constexpr double tileBytesPerBlock = 5000;
+/// The same for a flood: what it knows of a leaf and of its parts, and the copies of leaves on borders [bytes].
+constexpr double floodBytesPerBlock = 2000;
+/// Memory of a flood per block of the tile's box, leaf or not: its set and its leaf [bytes].
+constexpr double floodBytesPerBoxBlock = 9;
+
+}  // namespace
 
 Mesh meshOf(std::span<const TileTriangle> triangles, const glm::dvec3& origin) {
     Mesh mesh;
@@ -37,8 +43,6 @@ Mesh meshOf(std::span<const TileTriangle> triangles, const glm::dvec3& origin) {
     }
     return mesh;
 }
-
-}  // namespace
 
 BuiltTile buildTile(std::span<const TileTriangle> triangles, const MeshFacts& facts, const Tiling& tiling,
                     std::size_t tile, const BuildOptions& options, const PartSigns& signs) {
@@ -65,9 +69,11 @@ double tileBytes(std::uint64_t triangles, double area, const Tiling& tiling, std
                  const BuildOptions& options) {
     const TriangleLimits limits = tiling.limits(tile);
     const glm::dvec3 side = limits.upper - limits.lower;
-    const double blocks = std::min(side.x * side.y * side.z / blockVoxels, blocksAround(area, double(tiling.reach())));
+    const double boxBlocks = side.x * side.y * side.z / blockVoxels;
+    const double blocks = std::min(boxBlocks, blocksAround(area, double(tiling.reach())));
     return bytesOfProcess + side.x * side.y * bytesPerColumn + double(triangles) * tileBytesPerTriangle +
-           blocks * tileBytesPerBlock * (options.triangles ? 2 : 1);
+           blocks * tileBytesPerBlock * (options.triangles ? 2 : 1) +
+           (options.sign == Sign::flood ? blocks * floodBytesPerBlock + boxBlocks * floodBytesPerBoxBlock : 0);
 }
 
 }  // namespace bilayer::detail

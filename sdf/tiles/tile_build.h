@@ -46,9 +46,15 @@ struct BuiltTile {
     /// is.
     openvdb::FloatGrid::Ptr border;
     SignCounts counts{};
+    /// With signs by flood: whether all of a tile without grids is inside.
+    bool inside = false;
 };
 
-/// Builds a tile. Its bytes are those of the whole field.
+/// Returns the mesh of some triangles.
+Mesh meshOf(std::span<const TileTriangle> triangles, const glm::dvec3& origin);
+
+/// Builds a tile. Its bytes are those of the whole field, but for signs by flood: all distances are then positive, and
+/// FloodTile signs them.
 /// @param triangles  those that Tiling::forEachTileOf() gives the tile, in the order of the mesh
 /// @param options    valid and local
 /// @param signs      of all tiles, for Method::exact

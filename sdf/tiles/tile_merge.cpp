@@ -8,6 +8,7 @@
 
 #include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/sign/octree_cells.h"
 
 namespace bilayer::detail {
 namespace {
@@ -43,6 +44,10 @@ void requireSame(const openvdb::FloatGrid& first, const openvdb::FloatGrid& tile
     }
 }
 
+bool isFlooded(const openvdb::FloatGrid& tile) {
+    return entryOf<std::string>(tile, metadata::sign) == nameOf(Sign::flood);
+}
+
 // Blocks without a voxel in the band are in the tiles if the field needs them, so none is dropped.
 constexpr auto plain = Assembler::Plain::keep;
 
@@ -55,11 +60,19 @@ void TileMerger::begin(const openvdb::FloatGrid& first, bool triangles) {
     assembler_.emplace(BandWidths{first.background() / h, interior / h, h}, triangles, plain, progress_);
 }
 
+void TileMerger::addSpace(const openvdb::FloatGrid& tile) {
+    auto space = tile.cbeginValueOff();
+    space.setMaxDepth(openvdb::FloatGrid::ValueOffCIter::LEAF_DEPTH - 1);
+    for (; space; ++space)
+        if (*space < 0) inside_.push_back(space.getBoundingBox());
+}
+
 void TileMerger::add(const Grids& tile) {
     if (!assembler_) begin(*tile.distance, tile.triangle != nullptr);
     requireSame(*first_, *tile.distance);
     undecided_ += entryOf<std::int64_t>(*tile.distance, metadata::signUndecided);
     assembler_->copy(tile, [](const openvdb::Coord&) { return true; });
+    if (isFlooded(*first_)) addSpace(*tile.distance);
 }
 
 LevelSet TileMerger::merged() {
@@ -67,6 +80,7 @@ LevelSet TileMerger::merged() {
     const float interior = -entryOf<float>(*first_, metadata::interiorWidth);
     const openvdb::FloatGrid::Ptr distance = assembler_->distances(first_->background(), interior);
     distance->setTransform(first_->transform().copy());
+    if (isFlooded(*first_)) assemble(*distance, inside_, first_->background(), interior, &progress_);
     const bool bySigns = entryOf<std::string>(*first_, metadata::sign) == nameOf(Sign::normals);
     if (const std::size_t conflicts = bySigns ? assembler_->conflicts(*distance) : 0)
         throw std::invalid_argument(fmt::format("the signs of tiles contradict each other at {} places", conflicts));

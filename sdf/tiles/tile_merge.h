@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/level_set.h>
@@ -31,12 +32,14 @@ class TileMerger {
 
   private:
     void begin(const openvdb::FloatGrid& first, bool triangles);
+    void addSpace(const openvdb::FloatGrid& tile);
 
     std::function<bool(float)> never_;
     Progress progress_;
     openvdb::FloatGrid::Ptr first_;  // the metadata of the first tile, without its tree
     std::int64_t undecided_ = 0;
     std::optional<Assembler> assembler_;
+    std::vector<openvdb::CoordBBox> inside_;  // space of a flood, which leaves do not determine
 };
 
 }  // namespace bilayer::detail

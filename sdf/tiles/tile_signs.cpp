@@ -35,7 +35,9 @@ bool isAutomatic(const BuildOptions& options) {
 
 // The signs that were asked for.
 PartSigns requested(const BuildOptions& options, const TriangleSource& source) {
-    if (hasOwnSigns(options.method) || options.sign != Sign::winding) return {};
+    if (hasOwnSigns(options.method)) return {};
+    if (options.sign == Sign::flood) return {.method = Sign::flood};
+    if (options.sign != Sign::winding) return {};
     if (!source.isBalanced()) refuseOpen("this one has edges that are not used equally often in both directions");
     return byWinding(asAskedFor);
 }
@@ -55,9 +57,7 @@ PartSigns signsOf(const SignChoice& choice, const Mesh& mesh) {
     if (choice.sign == Sign::normals) return byNormals(choice.reason);
     if (choice.sign == Sign::winding && balanced(mesh)) return byWinding(choice.reason);
     if (choice.sign == Sign::winding) refuseOpen("the sign auto is winding here, because of " + choice.reason);
-    throw std::invalid_argument(
-        fmt::format("the sign auto is {} here, which tiles do not have, because of {}; build this field in one piece",
-                    nameOf(choice.sign), choice.reason));
+    return {.method = Sign::flood, .reason = choice.reason};
 }
 
 }  // namespace
@@ -89,6 +89,11 @@ SignedSource decideSigns(std::unique_ptr<TriangleSource> source, const BuildOpti
     if (!source->isBalanced())
         throw std::invalid_argument(fmt::format("edges are not used equally often in both directions, and {}", advice));
     return {std::move(source), byNormals(closedAndOriented)};
+}
+
+BuildOptions optionsWith(BuildOptions options, const PartSigns& signs) {
+    if (signs.method == Sign::flood) options.sign = Sign::flood;
+    return options;
 }
 
 SignVerdict judge(const SignCounts& sum) {

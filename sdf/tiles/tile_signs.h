@@ -23,12 +23,14 @@ struct SignedSource {
 /// Returns the signs that build() chooses for a mesh.
 /// @param round   how often normals have contradicted each other, for Sign::automatic
 /// @param orient  called before what needs several times the memory of the mesh; may throw
-/// Throws std::invalid_argument that names what tiles cannot do: signs of open meshes by winding numbers, signs by
-/// flood.
+/// Throws std::invalid_argument that names what tiles cannot do: signs of open meshes by winding numbers.
 SignedSource decideSigns(Mesh mesh, const BuildOptions& options, int round, const std::function<void()>& orient);
 
 /// The same for a mesh that is not read whole. Throws if only orienting the mesh could tell the signs.
 SignedSource decideSigns(std::unique_ptr<TriangleSource> source, const BuildOptions& options, int round);
+
+/// Returns the options of the tiles with these signs: a flood needs distances farther from the surface than others.
+BuildOptions optionsWith(BuildOptions options, const PartSigns& signs);
 
 /// What the counts of all tiles mean.
 enum class SignVerdict {

@@ -20,7 +20,8 @@ namespace {
 constexpr double limitsMargin = 1;
 
 float reachOf(const BuildOptions& options) {
-    return hasOwnSigns(options.method) ? layerReach(fillParameters(options)) : detail::reachOf(options, Sign::normals);
+    if (hasOwnSigns(options.method)) return layerReach(fillParameters(options));
+    return detail::reachOf(options, options.sign == Sign::flood ? Sign::flood : Sign::normals);
 }
 
 // Returns the bounds, unless index coordinates would leave 32 bits.
@@ -43,8 +44,6 @@ void requireLocal(const BuildOptions& options) {
     if (options.method != Method::exact && options.method != Method::doubleLayer)
         refuse(fmt::format("method {}", nameOf(options.method)),
                "its distances depend on the whole mesh; take exact or double-layer");
-    if (options.method == Method::exact && options.sign == Sign::flood)
-        refuse("sign flood", "a path from outside may pass through all tiles; take normals, winding or auto");
     if (options.unite) refuse("union", "walls inside other solids are found from the whole mesh");
 }
 

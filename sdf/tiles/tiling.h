@@ -24,7 +24,7 @@ void requireLocal(const BuildOptions& options);
 class Tiling {
   public:
     /// @param mesh     bounds of the mesh
-    /// @param options  valid and local
+    /// @param options  valid and local; with Sign::flood if that is what Sign::automatic chose
     /// @param counts   of tiles along each axis
     /// Throws std::invalid_argument that names an axis with fewer bricks than tiles.
     Tiling(const Bounds& mesh, const BuildOptions& options, const glm::ivec3& counts);

@@ -257,9 +257,6 @@ TEST_CASE("signs that only the whole mesh can give are refused by name") {
     open.triangles.pop_back();
     refused(open, Sign::winding, "tiles have winding numbers of closed and oriented meshes only");
     refused(open, Sign::automatic, "the sign auto is winding here, because of 3 boundary edges");
-    Mesh sheet = shapes::box({1, 1, 1}, 4);
-    sheet.triangles.resize(32);
-    refused(sheet, Sign::automatic, "the sign auto is flood here, which tiles do not have");
     CHECK(decideSigns(open, {.voxelSize = 0.05f, .sign = Sign::normals}, 0, [] {}).signs.method == Sign::normals);
 
     // what is not read whole is not oriented

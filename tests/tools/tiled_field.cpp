@@ -150,14 +150,22 @@ TEST_CASE("tiles without leaves have a side") {
     }
 }
 
-TEST_CASE("tiles with signs by winding numbers have the samples of the merged field") {
+TEST_CASE("tiles with signs by winding numbers or by flood have the samples of the merged field") {
     Mesh bar = shapes::box({20, 1, 1});
     for (glm::vec3& p : bar.points) p = {p.x - 0.01f * p.y, p.y + 0.01f * p.x, p.z};
     const Mesh bars = shapes::join({bar, shapes::moved(shapes::box({1, 20, 1}), {0, 0.05f, 0.025f})}),
                balls = shapes::join({shapes::sphere(1, 4), shapes::moved(shapes::sphere(0.8f, 4), {0.3f, 0.2f, 0.1f})});
-    const Tiles all[] = {builtTiles("tiled balls", balls, "4x4x4", {"--resolution", "160"}, "winding"),
-                         builtTiles("tiled auto", balls, "3x2x3", {"--resolution", "120"}, "auto"),
-                         builtTiles("tiled bars", bars, "2x2x1", {"--resolution", "40"}, "auto")};
+    Mesh open = shapes::box({1, 1, 1}, 8);
+    std::erase_if(open.triangles, [&](const glm::uvec3& t) {
+        return open.points[t.x].z > 0.99f && open.points[t.y].z > 0.99f && open.points[t.z].z > 0.99f &&
+               open.points[t.x].x > -0.2f;
+    });
+    const Tiles all[] = {
+        builtTiles("tiled balls", balls, "4x4x4", {"--resolution", "160"}, "winding"),
+        builtTiles("tiled auto", balls, "3x2x3", {"--resolution", "120"}, "auto"),
+        builtTiles("tiled bars", bars, "2x2x1", {"--resolution", "40"}, "auto"),
+        builtTiles("tiled hole", open, "3x3x4", {"--resolution", "120", "--gap", "3"}, "flood"),
+        builtTiles("tiled gap", open, "2x3x3", {"--resolution", "80", "--gap", "50", "--half-width", "0.9"}, "flood")};
     Random random(seed());
     for (const Tiles& tiles : all) {
         const Field whole(tiles.merged);

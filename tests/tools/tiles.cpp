@@ -208,7 +208,6 @@ TEST_CASE("tiles refuse what needs the whole field, by name") {
         CHECK(!fs::exists(folder));
     };
     const Words normals{"--sign", "normals"};
-    refused({"--sign", "flood"}, "tiles have no sign flood");
     refused({"--method", "pseudonormal", "--sign", "normals"}, "tiles have no method pseudonormal");
     refused(joined(normals, {"--union"}), "tiles have no union");
     refused(joined(normals, {"--body"}), "--body: is not for --tiles");

@@ -35,7 +35,20 @@ for name in clean two; do
     diff <("$bilayer" info --json merged.vdb) <("$bilayer" info --json whole.vdb)
   done
 done
+# an open box that overlaps a closed one, by floods with a small and a large ball
+for gap in 2 20; do
+  awk '!/^f 5 6 8 7/' two.obj >open.obj
+  "$bilayer" build open.obj -o whole.vdb --resolution 150 --sign flood --gap $gap >/dev/null
+  for count in 1 2 4; do
+    folder=open$gap.$count
+    mpirun --oversubscribe -n "$count" "$ranks" build open.obj -o "$folder" --resolution 150 --tiles 3x2x2 --sign flood \
+      --gap $gap --json >"$folder.json"
+    require_same "open$gap.1" "$folder"
+  done
+  "$bilayer" merge "$folder" -o merged.vdb >/dev/null
+  diff <("$bilayer" info --json merged.vdb) <("$bilayer" info --json whole.vdb)
+done
 # an error of one rank ends all of them
-if mpirun --oversubscribe -n 2 "$ranks" build "$mesh" -o refused --resolution 150 --tiles 3x2x2 --sign flood \
+if mpirun --oversubscribe -n 2 "$ranks" build "$mesh" -o refused --resolution 150 --tiles 90x2x2 --sign flood \
   2>refused.txt; then exit 1; fi
-grep -q "tiles have no sign flood" refused.txt
+grep -q "90 tiles along x" refused.txt

@@ -34,7 +34,7 @@ void MeshSort::run(const Json& identity, int round, const PlannedSigns* known) {
     const MeshFacts& facts = mesh.source->facts();
     const float side = facts.box.longestSide();
     setSizes(a_, a_.resolutionGiven->count() ? side / a_.resolution : a_.options.voxelSize);
-    Tiling tiling(facts.box, a_.options, counts_);
+    Tiling tiling(facts.box, optionsWith(a_.options, mesh.signs), counts_);
     folder_.create();
     // before the plan: a plan without some of its tiles can be resumed
     for (std::size_t tile = 0; round > 0 && !known && tile < tiling.size(); ++tile) folder_.remove(tiling.place(tile));

@@ -40,8 +40,9 @@ Json toJson(const PlannedSigns& planned) {
 PlannedSigns plannedSigns(const Json& json) {
     PlannedSigns planned;
     if (json.is_null()) return planned;
-    planned.signs.method =
-        json.at("method").get<std::string>() == detail::nameOf(Sign::winding) ? Sign::winding : Sign::normals;
+    const auto method = json.at("method").get<std::string>();
+    for (const Sign sign : {Sign::winding, Sign::flood})
+        if (method == detail::nameOf(sign)) planned.signs.method = sign;
     planned.signs.reason = json.at("reason").get<std::string>();
     planned.signs.check = checkOf(json.at("check").get<std::string>());
     planned.signs.name = json.at("name").get<std::string>();

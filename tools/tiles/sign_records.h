@@ -15,6 +15,7 @@ struct PlannedSigns {
 
     /// Returns whether tiles need the sums of the tiles below.
     bool needSums() const { return signs.method == Sign::winding || signs.check != detail::NormalsCheck::none; }
+    bool areByFlood() const { return signs.method == Sign::flood; }
 };
 
 Json toJson(const PlannedSigns& signs);

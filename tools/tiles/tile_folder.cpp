@@ -28,10 +28,24 @@ void TileFolder::create() const {
 
 void TileFolder::removePlan() const {
     std::filesystem::remove(plan());
-    std::vector<std::filesystem::path> sums;
+    removeFromWork({".sums", ".distances", ".border"});
+    removeGrowth();
+}
+
+void TileFolder::removeGrowth() const {
+    removeFromWork({".regions", ".by_distance", ".by_triangles", ".improved"});
+}
+
+void TileFolder::removeFromWork(std::initializer_list<const char*> endings) const {
+    std::vector<std::filesystem::path> found;
     for (const auto& entry : std::filesystem::directory_iterator(work()))
-        if (entry.path().extension() == ".sums") sums.push_back(entry.path());
-    for (const auto& path : sums) std::filesystem::remove(path);
+        if (std::find(endings.begin(), endings.end(), entry.path().extension()) != endings.end())
+            found.push_back(entry.path());
+    for (const auto& path : found) std::filesystem::remove(path);
+}
+
+std::filesystem::path TileFolder::improved(const std::string& growth, std::uint32_t round) const {
+    return work() / fmt::format("{}_{}.improved", growth, round);
 }
 
 void TileFolder::remove(const glm::ivec3& tile) const {

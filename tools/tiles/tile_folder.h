@@ -5,8 +5,10 @@
 // Tested by tests/tools/tiles.cpp through run().
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <glm/vec3.hpp>
+#include <initializer_list>
 #include <string>
 
 #include "tools/output.h"
@@ -29,13 +31,26 @@ class TileFolder {
     std::filesystem::path triangles(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".triangles"); }
     /// The sums of a tile's columns.
     std::filesystem::path sums(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".sums"); }
+    /// The unsigned distances of a tile, its border, and when a flood reaches it: by distances, and by triangles.
+    std::filesystem::path distances(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".distances"); }
+    std::filesystem::path border(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".border"); }
+    std::filesystem::path byDistance(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".by_distance"); }
+    std::filesystem::path byTriangles(const glm::ivec3& tile) const {
+        return work() / (nameOf(tile) + ".by_triangles");
+    }
+    /// The sides of the regions of a flood in all tiles.
+    std::filesystem::path regions() const { return work() / "all.regions"; }
+    /// It is there if a growth of a flood has improved any tile in a round.
+    std::filesystem::path improved(const std::string& growth, std::uint32_t round) const;
     /// What is known of a finished tile.
     std::filesystem::path record(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".json"); }
 
     /// Creates the folders that do not exist. Throws std::runtime_error that names the folder.
     void create() const;
-    /// Removes the plan, then the column sums.
+    /// Removes the plan, then what tiles of earlier signs told each other.
     void removePlan() const;
+    /// Removes what depends on the sides of a flood's regions.
+    void removeGrowth() const;
     /// Removes the files of a tile and its record.
     void remove(const glm::ivec3& tile) const;
     /// Removes the folder `work`.
@@ -45,6 +60,7 @@ class TileFolder {
 
   private:
     std::filesystem::path work() const { return root_ / "work"; }
+    void removeFromWork(std::initializer_list<const char*> endings) const;
     static std::string nameOf(const glm::ivec3& tile);
 
     std::filesystem::path root_;

@@ -86,6 +86,7 @@ Json identityOf(const BuildArguments& a, const glm::ivec3& counts, const std::st
             {"tiles", triple(counts)},
             {"method", a.method},
             {"sign", a.sign},
+            {"gap", number(a.options.gapVoxels)},
             {byResolution ? "resolution" : "voxelSize", number(byResolution ? a.resolution : a.options.voxelSize)},
             {"bandUnit", a.bandUnit},
             {"exteriorWidth", number(a.exteriorGiven->count() ? a.exteriorWidth : a.halfWidth)},

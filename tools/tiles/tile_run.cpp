@@ -22,6 +22,7 @@
 #include "sdf/tiles/tile_signs.h"
 #include "sdf/tiles/tile_sort.h"
 #include "tools/tiles/column_files.h"
+#include "tools/tiles/flood_run.h"
 #include "tools/tiles/mesh_sort.h"
 #include "tools/tiles/tile_folder.h"
 #include "tools/tiles/tile_plan.h"
@@ -112,14 +113,20 @@ class TileRun {
         if (std::filesystem::exists(folder_.manifest()) && isFinished()) return;
         if (!std::filesystem::exists(folder_.plan())) sort().run(identity_, 0);
         const TilePlan plan(readJson(folder_.plan()));
-        setSizes(a_, plan.voxelSize());
-        Tiling tiling(plan.facts().box, a_.options, counts_);
+        const Tiling tiling = tilingOf(plan);
         for (std::size_t tile = 0; tile < tiling.size(); ++tile) {
             const std::filesystem::path record = folder_.record(tiling.place(tile));
             if (std::filesystem::exists(record) && !isIntact(folder_, readJson(record)))
                 std::filesystem::remove(record);
         }
         stateMemory(plan, tiling);
+    }
+
+    // Also sets the options of the tiles.
+    Tiling tilingOf(const TilePlan& plan) {
+        setSizes(a_, plan.voxelSize());
+        options_ = optionsWith(a_.options, plan.signs().signs);
+        return {plan.facts().box, options_, counts_};
     }
 
     MeshSort sort() { return {a_, counts_, budget_, folder_}; }
@@ -140,12 +147,14 @@ class TileRun {
 
     void buildMissing() {
         const TilePlan plan(readJson(folder_.plan()));
-        setSizes(a_, plan.voxelSize());
-        const Tiling tiling(plan.facts().box, a_.options, counts_);
+        const Tiling tiling = tilingOf(plan);
         const std::vector<std::size_t> own = ownTiles(plan, tiling);
         ColumnFiles sums(folder_, plan, tiling);
+        FloodRun flood(folder_, plan, tiling, options_, ranks_);
         if (plan.signs().needSums()) writeSums(sums, tiling, own);
-        for (const std::size_t tile : own) build(plan, tiling, tile, sums);
+        if (plan.signs().areByFlood())
+            wrapped([&] { flood.prepare(shareOf(plan, tiling, [](std::size_t) { return true; })); });
+        for (const std::size_t tile : own) build(plan, tiling, tile, sums, flood);
         ranks_.wait();
         if (ranks_.isFirst()) finish(plan, tiling);
     }
@@ -160,7 +169,7 @@ class TileRun {
 
     double need(const TilePlan& plan, const Tiling& tiling, std::size_t tile) const {
         const TileLoad& load = plan.loads()[tile];
-        return tileBytes(load.triangles, load.area, tiling, tile, a_.options);
+        return tileBytes(load.triangles, load.area, tiling, tile, options_);
     }
 
     // Refuses, before any tile is built, what would not fit.
@@ -176,40 +185,57 @@ class TileRun {
         std::fflush(stdout);
     }
 
-    // The missing tiles, the largest first, dealt to all ranks in turn.
+    // This rank's share of the missing tiles.
     std::vector<std::size_t> ownTiles(const TilePlan& plan, const Tiling& tiling) const {
-        std::vector<std::size_t> missing, own;
-        for (std::size_t tile = 0; tile < tiling.size(); ++tile)
-            if (!std::filesystem::exists(folder_.record(tiling.place(tile)))) missing.push_back(tile);
-        std::stable_sort(missing.begin(), missing.end(),
-                         [&](std::size_t a, std::size_t b) { return need(plan, tiling, a) > need(plan, tiling, b); });
+        std::vector<std::size_t> own = shareOf(plan, tiling, [&](std::size_t tile) {
+            return !std::filesystem::exists(folder_.record(tiling.place(tile)));
+        });
         ranks_.wait();  // else a record of a fast rank would be missed here
-        for (std::size_t i = std::size_t(ranks_.rank); i < missing.size(); i += std::size_t(ranks_.count))
-            own.push_back(missing[i]);
         return own;
     }
 
-    void build(const TilePlan& plan, const Tiling& tiling, std::size_t tile, ColumnFiles& sums) {
+    // Some tiles, the largest first, dealt to all ranks in turn.
+    template <class Wanted>
+    std::vector<std::size_t> shareOf(const TilePlan& plan, const Tiling& tiling, const Wanted& wanted) const {
+        std::vector<std::size_t> all, own;
+        for (std::size_t tile = 0; tile < tiling.size(); ++tile)
+            if (wanted(tile)) all.push_back(tile);
+        std::stable_sort(all.begin(), all.end(),
+                         [&](std::size_t a, std::size_t b) { return need(plan, tiling, a) > need(plan, tiling, b); });
+        for (std::size_t i = std::size_t(ranks_.rank); i < all.size(); i += std::size_t(ranks_.count))
+            own.push_back(all[i]);
+        return own;
+    }
+
+    BuiltTile built(const TilePlan& plan, const Tiling& tiling, std::size_t tile, ColumnFiles& sums) {
+        const std::uint64_t count = plan.loads()[tile].triangles;
+        BuiltTile built;
+        if (count == 0) return built;
+        PartSigns signs = plan.signs().signs;
+        std::optional<ColumnSums> below;
+        if (plan.signs().needSums()) signs.below = &below.emplace(sums.below(tile));
+        const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(tiling.place(tile)), count);
+        wrapped([&] { built = buildTile(triangles, plan.facts(), tiling, tile, options_, signs); });
+        return built;
+    }
+
+    void build(const TilePlan& plan, const Tiling& tiling, std::size_t tile, ColumnFiles& sums, FloodRun& flood) {
         const Stopwatch watch;
         const glm::ivec3 place = tiling.place(tile);
         const std::uint64_t count = plan.loads()[tile].triangles;
-        BuiltTile built;
         const std::uint64_t sumsBefore = sums.readBytes();
-        if (count > 0) {
-            PartSigns signs = plan.signs().signs;
-            std::optional<ColumnSums> below;
-            if (plan.signs().needSums()) signs.below = &below.emplace(sums.below(tile));
-            const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), count);
-            wrapped([&] { built = buildTile(triangles, plan.facts(), tiling, tile, a_.options, signs); });
-        }
+        const bool isByFlood = plan.signs().areByFlood();
+        BuiltTile built = isByFlood ? flood.build(tile) : this->built(plan, tiling, tile, sums);
+        const FloodRun::Load load = flood.takeLoad();
         Json record = recordOf(place, tiling.own(tile).within(tiling.lattice()), count, built);
         record["readBytes"] = count * sizeof(TileTriangle);
-        record["sumBytes"] = sums.readBytes() - sumsBefore;
+        record["sumBytes"] = sums.readBytes() - sumsBefore + load.bytes;
+        if (isByFlood && !built.grids) record["side"] = built.inside ? "inside" : "outside";
         if (built.grids) writeTile(std::move(built), place, plan.facts().origin, tiling.own(tile), record);
         built = {};
         ::malloc_trim(0);  // what one tile has used is free for the next
         record["rank"] = ranks_.rank;
-        record["seconds"] = watch.seconds();
+        record["seconds"] = watch.seconds() + load.seconds;
         record["peakRssBytes"] = peakMemory();
         writeJson(folder_.record(place), record);
     }
@@ -234,7 +260,7 @@ class TileRun {
         const auto coord = [](const glm::ivec3& v) { return openvdb::Coord(v.x, v.y, v.z); };
         const auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(tile.grids->distance);
         addBorder(grid->tree(), tile.border->tree());
-        return surfaceBlocks(grid->tree(), {coord(own.first), coord(own.end - 1)}, a_.options.voxelSize);
+        return surfaceBlocks(grid->tree(), {coord(own.first), coord(own.end - 1)}, options_.voxelSize);
     }
 
     template <class Work>
@@ -257,10 +283,10 @@ class TileRun {
         if (plan.signs().signs.check == NormalsCheck::count)
             if (const SignCounts sum = sumOf(counts); judge(sum) != SignVerdict::right)
                 return planAgain(plan, tiling, sum);
-        if (std::all_of(records.begin(), records.end(), [](const Json& r) { return r.at("file").is_null(); }))
+        if (std::all_of(records.begin(), records.end(), [](const Json& r) { return r.at("activeVoxels") == 0; }))
             throw std::invalid_argument(
                 "the half width is too small for this voxel size: no voxel lies within the band");
-        joinSides(records, counts_);
+        if (!plan.signs().areByFlood()) joinSides(records, counts_);
         writeJson(folder_.manifest(), plan.manifest(records, ranks_.count));
         folder_.clean();
     }
@@ -270,6 +296,8 @@ class TileRun {
         const int round = plan.signs().round;
         if (conflict) {
             sort().run(identity_, round + 1);
+            const TilePlan next(readJson(folder_.plan()));
+            if (next.signs().areByFlood()) stateMemory(next, tilingOf(next));  // which needs more than others
         } else {
             for (std::size_t tile = 0; tile < tiling.size(); ++tile) folder_.remove(tiling.place(tile));
             writeJson(folder_.plan(), plan.with({corrected(plan.signs().signs, sum), round}));
@@ -281,6 +309,7 @@ class TileRun {
     }
 
     BuildArguments a_;
+    BuildOptions options_;  // of the tiles
     glm::ivec3 counts_;
     double budget_;  // [bytes]
     const Ranks& ranks_;
