@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// MappedFile on the heap, in place of the library's: the address sanitizer sees reads beyond the end of a file there.
+// MappedFile on the heap, in place of the library's: the address sanitizer sees reads beyond the end of a file there, and
+// of one that was unmapped.
 #include <fstream>
 
 #include "sdf/io/input_file.h"
@@ -7,7 +8,7 @@
 
 namespace bilayer::detail {
 
-MappedFile::MappedFile(const std::filesystem::path& path) {
+MappedFile::MappedFile(const std::filesystem::path& path, Paging) {
     requireInputFile(path);
     size_ = std::filesystem::file_size(path);
     char* data = new char[size_];
@@ -16,7 +17,15 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
 }
 
 MappedFile::~MappedFile() {
+    unmap();
+}
+
+void MappedFile::release() const {}
+
+void MappedFile::unmap() {
     delete[] data_;
+    data_ = nullptr;
+    size_ = 0;
 }
 
 }  // namespace bilayer::detail
