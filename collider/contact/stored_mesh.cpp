@@ -29,6 +29,11 @@ std::size_t bytesOf(const MeshHead& head) {
     return sizeof(head) + head.points * sizeof(glm::vec3) + head.triangles * sizeof(glm::uvec3);
 }
 
+/// Of nothing, pointers may be null, which std::memcpy() does not allow.
+void copyBytes(void* to, const void* from, std::size_t count) {
+    if (count > 0) std::memcpy(to, from, count);
+}
+
 }  // namespace
 
 // A header, three coordinates per vertex, three vertex indices per triangle.
@@ -41,8 +46,8 @@ openvdb::Metadata::Ptr packMesh(const Mesh& mesh) {
     Bytes::ByteVec bytes(bytesOf(head));
     const std::size_t pointBytes = head.points * sizeof(glm::vec3);
     std::memcpy(bytes.data(), &head, sizeof(head));
-    std::memcpy(bytes.data() + sizeof(head), mesh.points.data(), pointBytes);
-    std::memcpy(bytes.data() + sizeof(head) + pointBytes, mesh.triangles.data(), head.triangles * sizeof(glm::uvec3));
+    copyBytes(bytes.data() + sizeof(head), mesh.points.data(), pointBytes);
+    copyBytes(bytes.data() + sizeof(head) + pointBytes, mesh.triangles.data(), head.triangles * sizeof(glm::uvec3));
     const auto entry = std::make_shared<Bytes>(meshType);
     entry->setValue(bytes);
     return entry;
@@ -53,14 +58,14 @@ std::shared_ptr<Mesh> unpackMesh(const openvdb::Metadata& entry) {
     if (!stored) refuseBody(fmt::format("'{}' is of type {}", meshEntry, quotedWord(entry.typeName())));
     const Bytes::ByteVec& bytes = stored->value();
     MeshHead head{};
-    std::memcpy(&head, bytes.data(), std::min(sizeof(head), bytes.size()));
+    copyBytes(&head, bytes.data(), std::min(sizeof(head), bytes.size()));
     if (bytesOf(head) != bytes.size()) refuseBody(fmt::format("'{}' is too short or too long", meshEntry));
     auto mesh = std::make_shared<Mesh>();
     mesh->points.resize(head.points);
     mesh->triangles.resize(head.triangles);
     const std::size_t pointBytes = head.points * sizeof(glm::vec3);
-    std::memcpy(mesh->points.data(), bytes.data() + sizeof(head), pointBytes);
-    std::memcpy(mesh->triangles.data(), bytes.data() + sizeof(head) + pointBytes, head.triangles * sizeof(glm::uvec3));
+    copyBytes(mesh->points.data(), bytes.data() + sizeof(head), pointBytes);
+    copyBytes(mesh->triangles.data(), bytes.data() + sizeof(head) + pointBytes, head.triangles * sizeof(glm::uvec3));
     if (hash(*mesh) != head.hash) refuseBody(fmt::format("'{}' is not what was written", meshEntry));
     try {
         validate(*mesh);

@@ -8,6 +8,7 @@
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
@@ -362,9 +363,10 @@ TEST_CASE("the mass of a field has the same bytes for any number of threads") {
         return massProperties(field);
     };
     const MassProperties one = with(1);
+    const std::size_t bytes = offsetof(MassProperties, principalAxes) + sizeof one.principalAxes;  // padding follows
     for (const std::size_t threads : {2, 4}) {
         const MassProperties more = with(threads);
-        CHECK(std::memcmp(&one, &more, sizeof one) == 0);
+        CHECK(std::memcmp(&one, &more, bytes) == 0);
     }
 }
 }  // namespace bilayer::mass_test
