@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// MappedFile on the heap, in place of the library's: the address sanitizer sees reads beyond the end of a file there, and
-// of one that was unmapped.
+// MappedFile on the heap, in place of the library's: the address sanitizer sees reads beyond the end of a file there,
+// and of one that was unmapped.
 #include <fstream>
 
 #include "sdf/io/input_file.h"
