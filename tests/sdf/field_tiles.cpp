@@ -165,7 +165,6 @@ TEST_CASE("what only the whole mesh can decide is refused by name") {
     const auto refused = [](const BuildOptions& options, const std::string& name) {
         CHECK_THROWS_WITH(requireLocal(options), Contains(name));
     };
-    refused({.voxelSize = h, .sign = Sign::flood}, "no sign flood");
     refused({.voxelSize = h, .method = Method::pseudonormal, .sign = Sign::normals}, "no method pseudonormal");
     refused({.voxelSize = h, .method = Method::prism}, "no method prism");
     refused({.voxelSize = h, .sign = Sign::normals, .unite = true}, "no union");
