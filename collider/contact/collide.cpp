@@ -41,6 +41,21 @@ class NormalsNear {
     NormalsNear(const Placed& body, float maxDistance)
         : body_(body), surface_(body.collider, false, maxDistance > 0), maxDistance_(maxDistance / body.scale) {}
 
+    // Whether a test holds for the normal near a place: next to an edge for that of the triangles, else for that of
+    // samples. Whether there is an edge is asked for only if the test tells them apart.
+    // @param outward  the direction in which the edge is
+    // @param test     bool (const glm::vec3& normal)
+    template <class Test>
+    bool holdsAt(const glm::vec3& place, const glm::vec3& outward, const Test& test) const {
+        const glm::vec3 here = at(place, true);
+        const bool holds = test(here);
+        if (holds == test(at(place, false))) return holds;
+        const float reach = beyondEdge * body_.scale * surface_.voxelSize();
+        const bool isEdge = glm::dot(here, at(place + reach * outward, true)) < sharpCosine;
+        return isEdge == holds;
+    }
+
+  private:
     // @param byTriangles  if the field has them
     glm::vec3 at(const glm::vec3& place, bool byTriangles) const {
         const glm::vec3 point = body_.pose.toBody(place) / body_.scale;
@@ -52,16 +67,6 @@ class NormalsNear {
         return there ? body_.pose.rotation * there->normal : glm::vec3(0);
     }
 
-    // The same, by the triangles next to an edge.
-    // @param outward  the direction in which the edge is
-    glm::vec3 nearEdge(const glm::vec3& place, const glm::vec3& outward) const {
-        const float reach = beyondEdge * body_.scale * surface_.voxelSize();
-        const glm::vec3 here = at(place, true);
-        const bool isEdge = glm::dot(here, at(place + reach * outward, true)) < sharpCosine;
-        return isEdge ? here : at(place, false);
-    }
-
-  private:
     const Placed& body_;
     ContactField surface_;
     float maxDistance_;  // in the body's units
@@ -81,11 +86,11 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
                             const SurfaceSample& sample) {
         const glm::vec3 own = body.pose.rotation * point.normal;
         const auto facesEdge = [&] {
-            const auto normalAt = [&](const glm::vec3& place) {
-                return normalsNear(other).nearEdge(place, glm::normalize(normal - glm::dot(normal, own) * own));
+            const auto holdsAt = [&](const glm::vec3& place, auto&& test) {
+                return normalsNear(other).holdsAt(place, glm::normalize(normal - glm::dot(normal, own) * own), test);
             };
             return facesEdgeObliquely(body.pose.toWorld(body.scale * point.position), own,
-                                      sample.distance * other.scale, normal, normalAt);
+                                      sample.distance * other.scale, normal, holdsAt);
         };
         return passesNormalFilter(options, normal, own, body.motion.rotation - other.motion.rotation,
                                   sample.distance > 0 && !point.isSharp, facesEdge);

@@ -167,9 +167,9 @@ class PointsOnConvex {
         const bool isSeparated =
             nearest.distance > 0 && !point.isSharp && !convex_.isRound(nearest) && !body_.options.exact;
         const auto facesEdge = [&] {
+            const auto holdsAt = [&](const glm::vec3& place, auto&& test) { return test(body_.nearest(place).normal); };
             return facesEdgeObliquely(body_.intoConvex(position), body_.toConvex * point.normal, nearest.distance,
-                                      nearest.normal,
-                                      [&](const glm::vec3& place) { return body_.nearest(place).normal; });
+                                      nearest.normal, holdsAt);
         };
         if (!passesNormalFilter(body_.options, -normal, point.normal, -local_.relativeMotion().rotation(), isSeparated,
                                 facesEdge))

@@ -158,8 +158,8 @@ std::optional<Contact> FaceContacts::contactAtFoot(const glm::vec3& foot, const 
     const bool isSeparated = !(std::abs(there.distance) <= touchingDistance * field_.voxel);
     const glm::quat& rotation = field_.placed.pose.rotation;
     const auto facesEdge = [&] {
-        const auto normalAt = [&](const glm::vec3& place) { return field_.local.at(place).normal; };
-        return there.distance > 0 && facesEdgeObliquely(foot, -normal, there.distance, there.normal, normalAt);
+        const auto holdsAt = [&](const glm::vec3& place, auto&& test) { return test(field_.local.at(place).normal); };
+        return there.distance > 0 && facesEdgeObliquely(foot, -normal, there.distance, there.normal, holdsAt);
     };
     if (!passesNormalFilter(field_.options, contact->normal, -(rotation * normal),
                             rotation * field_.local.relativeMotion().rotation(), isSeparated, facesEdge))

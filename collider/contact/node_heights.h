@@ -58,7 +58,7 @@ inline unsigned boundHeights(const OrientedBoxes& group, const GroupFrame& frame
 }
 
 /// The least height of the triangles below a node along a direction. By branch and bound, lowest box first.
-inline double leastHeight(PosedTree& mesh, std::uint32_t top, const glm::dvec3& direction) {
+inline double minHeight(PosedTree& mesh, std::uint32_t top, const glm::dvec3& direction) {
     struct Pending {
         double bound;
         std::uint32_t node;
@@ -71,7 +71,7 @@ inline double leastHeight(PosedTree& mesh, std::uint32_t top, const glm::dvec3& 
         const auto [bound, node] = stack[--pending];
         if (!(bound < least)) continue;
         if (mesh.tree().isLeaf(node)) {
-            least = std::min(least, mesh.leastHeight(node, direction));
+            least = std::min(least, mesh.minHeight(node, direction));
             continue;
         }
         const OrientedBoxes& group = mesh.group(node);
@@ -99,7 +99,7 @@ class NodeHeights {
     double of(PosedTree& mesh, std::uint32_t node) {
         Kept& kept = kept_[node % kept_.size()];
         if (kept.node != node || kept.direction != directions_)
-            kept = {node, directions_, leastHeight(mesh, node, direction_)};
+            kept = {node, directions_, minHeight(mesh, node, direction_)};
         return kept.height;
     }
 

@@ -65,15 +65,17 @@ bool passesNormalFilter(const ContactOptions& options, const glm::vec3& surfaceN
 /// place is on an edge. The edge's own points then make the contact with the face.
 /// @param position, normal         of the point
 /// @param distance, surfaceNormal  distance and outward normal of the other surface there
-/// @param normalAt                 glm::vec3 (const glm::vec3&): normal of the other surface near a place
-template <class NormalAt>
+/// @param holdsAt                  bool (const glm::vec3& place, test): whether a test holds for the normal of the
+///                                 other surface near a place
+template <class HoldsAt>
 bool facesEdgeObliquely(const glm::vec3& position, const glm::vec3& normal, float distance,
-                        const glm::vec3& surfaceNormal, NormalAt&& normalAt) {
+                        const glm::vec3& surfaceNormal, HoldsAt&& holdsAt) {
     constexpr float maxRemainingPart = 0.1f;  // of 1 - cosine: on an edge, the normals there are almost opposite
     const float cosine = -glm::dot(surfaceNormal, normal);
     if (cosine > sameFaceCosine) return false;
-    const glm::vec3 there = normalAt(position - distance * surfaceNormal - cosine * distance * normal);
-    return 1 + glm::dot(there, normal) < maxRemainingPart * (1 - cosine);
+    return holdsAt(position - distance * surfaceNormal - cosine * distance * normal, [&](const glm::vec3& there) {
+        return 1 + glm::dot(there, normal) < maxRemainingPart * (1 - cosine);
+    });
 }
 
 }  // namespace bilayer::detail

@@ -114,7 +114,7 @@ class PosedTree {
     }
 
     /// The least height of the triangles of a leaf along a direction of the common frame.
-    double leastHeight(std::uint32_t leaf, const glm::dvec3& direction) const {
+    double minHeight(std::uint32_t leaf, const glm::dvec3& direction) const {
         const Mesh& mesh = mesh_.mesh();
         const glm::dvec3 inMesh = direction * linear_;
         double least = std::numeric_limits<double>::infinity();

@@ -12,11 +12,10 @@
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
-#include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
-#include "tests/tools/program.h"
+#include "tests/tools/tile_builds.h"
 
 namespace bilayer::tile_floods_test {
 using namespace bilayer::test;
@@ -25,47 +24,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Words with(Words words, const Words& more) {
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
-}
-
-nlohmann::json built(const Words& words) {
-    const Result r = run(words);
-    INFO(r.err);
-    REQUIRE(r.status == 0);
-    return r.json();
-}
-
-Words tiled(const fs::path& mesh, const fs::path& folder, const std::string& tiles, const Words& options) {
-    return with({"build", mesh.string(), "-o", folder.string(), "--tiles", tiles, "--json"}, options);
-}
-
-LevelSet merged(const fs::path& folder) {
-    const fs::path file = folder.string() + ".vdb";
-    fs::remove(file);
-    built({"merge", folder.string(), "-o", file.string(), "--json"});
-    return readVdb(file);
-}
-
-LevelSet inOnePiece(const fs::path& mesh, const Words& options) {
-    const fs::path file = scratch("whole flood.vdb");
-    built(with({"build", mesh.string(), "-o", file.string(), "--json"}, options));
-    return readVdb(file);
-}
-
-nlohmann::json same(const fs::path& mesh, const std::string& tiles, const Words& options) {
-    CAPTURE(mesh.string(), tiles);
-    const fs::path folder = scratch("flood" + tiles);
-    fs::remove_all(folder);
-    const nlohmann::json manifest = built(tiled(mesh, folder, tiles, options));
-    const LevelSet whole = inOnePiece(mesh, options);
-    CHECK(sameFields(merged(folder), whole));
-    CHECK(!fs::exists(folder / "work"));
+nlohmann::json sameAsFlood(const fs::path& mesh, const std::string& tiles, const Words& options) {
+    nlohmann::json manifest = sameInTiles(mesh, tiles, options);
     CHECK(manifest["signs"]["name"] == "flood");
-    CHECK(manifest["signs"]["reason"] == whole.signReason());
-    CHECK(manifest["sum"]["leaves"] == whole.leaves());
-    CHECK(manifest["sum"]["activeVoxels"] == whole.activeVoxels());
     return manifest;
 }
 
@@ -93,9 +54,9 @@ const char* const tilings[] = {"1x1x1", "2x1x1", "3x2x2"};
 
 TEST_CASE("signs by flood are built in tiles") {
     const fs::path mesh = shellsFile();
-    for (const char* tiles : tilings) same(mesh, tiles, flood);
-    same(mesh, "3x2x2", with(flood, {"--gap", "20"}));
-    same(mesh, "3x2x2", with(flood, {"--triangles", "--exterior-width", "5", "--interior-width", "0.7"}));
+    for (const char* tiles : tilings) sameAsFlood(mesh, tiles, flood);
+    sameAsFlood(mesh, "3x2x2", joined(flood, {"--gap", "20"}));
+    sameAsFlood(mesh, "3x2x2", joined(flood, {"--triangles", "--exterior-width", "5", "--interior-width", "0.7"}));
 }
 
 TEST_CASE("auto chooses signs by flood for all tiles") {
@@ -103,7 +64,7 @@ TEST_CASE("auto chooses signs by flood for all tiles") {
     sheet.triangles.resize(128);
     const fs::path path = scratch("sheet flood.ply");
     writeMesh(path, sheet);
-    for (const char* tiles : {"1x1x1", "1x2x3"}) CHECK(same(path, tiles, size)["signs"]["round"] == 0);
+    for (const char* tiles : {"1x1x1", "1x2x3"}) CHECK(sameAsFlood(path, tiles, size)["signs"]["round"] == 0);
 }
 
 TEST_CASE("a mesh that is not read whole has signs by flood") {
@@ -113,7 +74,7 @@ TEST_CASE("a mesh that is not read whole has signs by flood") {
     writeMesh(mesh, large);
     const Words options{"--resolution", "160", "--sign", "flood"};
     fs::remove_all(folder);
-    const nlohmann::json manifest = built(tiled(mesh, folder, "4x4x4", with(options, {"--memory", "300"})));
+    const nlohmann::json manifest = built(tiled(mesh, folder, "4x4x4", joined(options, {"--memory", "300"})));
     CHECK(manifest["sorting"]["streamed"] == true);
     CHECK(sameTrees(*merged(folder).grids().distance, *inOnePiece(mesh, options).grids().distance));
 }
@@ -129,7 +90,7 @@ TEST_CASE("a damaged tile of a flood is built again") {
     CHECK(again["tiles"][1] != manifest["tiles"][1]);
     CHECK(sameFields(merged(folder), inOnePiece(mesh, flood)));
     CHECK(built(words) == again);
-    const Result other = run(tiled(mesh, folder, "2x2x2", with(flood, {"--gap", "7"})));
+    const Result other = run(tiled(mesh, folder, "2x2x2", joined(flood, {"--gap", "7"})));
     CHECK(other.status == 1);
     CHECK(other.err.find("other options") != std::string::npos);
 }

@@ -7,11 +7,10 @@
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
-#include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
-#include "tests/tools/program.h"
+#include "tests/tools/tile_builds.h"
 
 namespace bilayer::tile_signs_test {
 using namespace bilayer::test;
@@ -19,11 +18,6 @@ using namespace bilayer::test;
 namespace fs = std::filesystem;
 
 namespace {
-
-Words joined(Words words, const Words& more) {
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
-}
 
 fs::path fileOf(const Mesh& mesh, const std::string& name) {
     const fs::path path = scratch(name);
@@ -42,52 +36,9 @@ Mesh withFlippedTriangles() {
     return mesh;
 }
 
-nlohmann::json built(const Words& words) {
-    const Result r = run(words);
-    INFO(r.err);
-    REQUIRE(r.status == 0);
-    return r.json();
-}
-
-Words tiled(const fs::path& mesh, const fs::path& folder, const std::string& tiles, const Words& options) {
-    return joined({"build", mesh.string(), "-o", folder.string(), "--tiles", tiles, "--json"}, options);
-}
-
-LevelSet merged(const fs::path& folder) {
-    const fs::path file = folder.string() + ".vdb";
-    fs::remove(file);
-    built({"merge", folder.string(), "-o", file.string(), "--json"});
-    return readVdb(file);
-}
-
-LevelSet inOnePiece(const fs::path& mesh, const Words& options) {
-    const fs::path file = scratch("whole.vdb");
-    built(joined({"build", mesh.string(), "-o", file.string(), "--json"}, options));
-    return readVdb(file);
-}
-
-// Builds in tiles, and compares the merged field with one that is built in one piece. Returns the manifest.
-nlohmann::json same(const fs::path& mesh, const std::string& tiles, const Words& options) {
-    CAPTURE(mesh.string(), tiles);
-    const fs::path folder = scratch("tiles" + tiles);
-    fs::remove_all(folder);
-    const nlohmann::json manifest = built(tiled(mesh, folder, tiles, options));
-    const LevelSet whole = inOnePiece(mesh, options);
-    CHECK(sameFields(merged(folder), whole));
-    CHECK(!fs::exists(folder / "work"));
-    CHECK(manifest["signs"]["name"] == whole.sign());
-    CHECK(manifest["signs"]["reason"] == whole.signReason());
-    CHECK(manifest["sum"]["leaves"] == whole.leaves());
-    CHECK(manifest["sum"]["activeVoxels"] == whole.activeVoxels());
-    return manifest;
-}
-
 void refused(const fs::path& mesh, const Words& options, const std::string& why) {
     const fs::path folder = scratch("refused");
-    const Result r = run(tiled(mesh, folder, "2x2x2", options));
-    INFO(r.err);
-    CHECK(r.status == 1);
-    CHECK(r.err.find(why) != std::string::npos);
+    checkRefusal(tiled(mesh, folder, "2x2x2", options), 1, why);
     CHECK(!fs::exists(folder / "manifest.json"));
     fs::remove_all(folder);
 }
@@ -103,10 +54,10 @@ TEST_CASE("auto takes the signs of a build in one piece") {
                    insideOut = fileOf(shapes::flipped(shapes::sphere(1, 5)), "inside-out.ply"),
                    crossed = fileOf(overlapping(), "overlapping.ply");
     for (const char* tiles : tilings) {
-        CHECK(same(clean, tiles, size)["signs"]["round"] == 0);
-        CHECK(same(flipped, tiles, size)["signs"]["method"] == "normals");
-        CHECK(same(insideOut, tiles, size)["signs"]["round"] == 1);
-        const nlohmann::json signs = same(crossed, tiles, size)["signs"];
+        CHECK(sameInTiles(clean, tiles, size)["signs"]["round"] == 0);
+        CHECK(sameInTiles(flipped, tiles, size)["signs"]["method"] == "normals");
+        CHECK(sameInTiles(insideOut, tiles, size)["signs"]["round"] == 1);
+        const nlohmann::json signs = sameInTiles(crossed, tiles, size)["signs"];
         CHECK(signs["method"] == "winding");
         CHECK(signs["round"] == 1);
     }
@@ -115,8 +66,8 @@ TEST_CASE("auto takes the signs of a build in one piece") {
 TEST_CASE("winding numbers of closed meshes are built in tiles") {
     const fs::path mesh = fileOf(overlapping(), "balls.ply");
     const Words winding = joined(size, {"--sign", "winding"});
-    for (const char* tiles : tilings) same(mesh, tiles, winding);
-    same(mesh, "3x1x2", joined(winding, {"--triangles", "--exterior-width", "5", "--interior-width", "2"}));
+    for (const char* tiles : tilings) sameInTiles(mesh, tiles, winding);
+    sameInTiles(mesh, "3x1x2", joined(winding, {"--triangles", "--exterior-width", "5", "--interior-width", "2"}));
 }
 
 // Between two thin walls, normals are wrong without a conflict.
@@ -128,7 +79,7 @@ TEST_CASE("corrected signs are built in tiles") {
     std::size_t corrected = 0;
     for (const char* resolution : {"25", "30", "40", "80"})
         for (const char* tiles : {"1x1x1", "2x1x1"})
-            corrected += same(bars, tiles, {"--resolution", resolution})["signs"]["check"] == "correct";
+            corrected += sameInTiles(bars, tiles, {"--resolution", resolution})["signs"]["check"] == "correct";
     CHECK(corrected > 0);
 }
 

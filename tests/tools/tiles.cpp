@@ -12,11 +12,10 @@
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
-#include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
-#include "tests/tools/program.h"
+#include "tests/tools/tile_builds.h"
 
 namespace bilayer::tiles_test {
 using namespace bilayer::test;
@@ -25,46 +24,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Words joined(Words words, const Words& more) {
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
-}
+const Words normals{"--sign", "normals"};
 
-Words tiledBuild(const fs::path& mesh, const fs::path& folder, const std::string& tiles, const Words& options = {}) {
-    return joined({"build", mesh.string(), "-o", folder.string(), "--tiles", tiles, "--sign", "normals", "--json"},
-                  options);
-}
-
-nlohmann::json builtTiles(const Words& words) {
-    const Result r = run(words);
-    INFO(r.err);
-    REQUIRE(r.status == 0);
-    CHECK(r.err.empty());
-    return r.json();
-}
-
-// Merges the tiles of a folder.
-LevelSet merged(const fs::path& folder) {
-    const fs::path file = folder.string() + ".vdb";
-    const Result r = run({"merge", folder.string(), "-o", file.string(), "--json"});
-    INFO(r.err);
-    REQUIRE(r.status == 0);
-    return readVdb(file);
-}
-
-fs::path fieldInOnePiece(const fs::path& mesh, const std::string& name, const Words& options) {
-    const fs::path file = scratch(name);
-    const Result r = run(joined({"build", mesh.string(), "-o", file.string()}, options));
-    INFO(r.err);
-    REQUIRE(r.status == 0);
-    return file;
-}
-
-void requireRefusal(const Words& words, int status, const std::string& culprit) {
-    const Result r = run(words);
-    INFO(r.err);
-    CHECK(r.status == status);
-    CHECK(r.err.find(culprit) != std::string::npos);
+Words withNormals(const fs::path& mesh, const fs::path& folder, const std::string& tiles, const Words& options) {
+    return tiled(mesh, folder, tiles, joined(options, normals));
 }
 
 // The bytes of a .vdb file but for OpenVDB's random identifier at the start, and the checksum at the end.
@@ -88,27 +51,15 @@ TEST_CASE("merged tiles are the field that is built in one piece") {
     const std::string tilings[] = {"1x1x1", "3x2x1", "4x4x2"};
     const Words options[] = {{"--resolution", "150"},
                              {"--voxel-size", "0.02", "--half-width", "0.1", "--band-unit", "world", "--triangles"}};
-    for (const Words& some : options) {
-        const LevelSet whole = readVdb(fieldInOnePiece(mesh, "whole.vdb", joined(some, {"--sign", "normals"})));
-        for (const std::string& tiles : tilings) {
-            CAPTURE(tiles, some.back());
-            const fs::path folder = scratch("tiles" + tiles + some.back());
-            const nlohmann::json manifest = builtTiles(tiledBuild(mesh, folder, tiles, some));
-            CHECK(sameFields(merged(folder), whole));
-            CHECK(!fs::exists(folder / "work"));
-            CHECK(manifest == nlohmann::json::parse(contents(folder / "manifest.json")));
-            CHECK(manifest["sum"]["activeVoxels"] == whole.activeVoxels());
-            CHECK(manifest["sum"]["leaves"] == whole.leaves());
-        }
-    }
+    for (const Words& some : options)
+        for (const std::string& tiles : tilings) sameInTiles(mesh, tiles, joined(some, normals));
 }
 
 TEST_CASE("the double layer method is built in tiles") {
     const fs::path mesh = largeMeshFile("layers.ply"), folder = scratch("layers");
     const Words options{"--resolution", "120", "--method", "double-layer"};
-    const Words words = joined({"build", mesh.string(), "-o", folder.string(), "--tiles", "3x2x1", "--json"}, options);
-    builtTiles(words);
-    CHECK(sameFields(merged(folder), readVdb(fieldInOnePiece(mesh, "layers.vdb", options))));
+    built(tiled(mesh, folder, "3x2x1", options));
+    CHECK(sameFields(merged(folder), inOnePiece(mesh, options)));
 }
 
 TEST_CASE("a mesh that is not read whole gives the same leaves") {
@@ -119,13 +70,12 @@ TEST_CASE("a mesh that is not read whole gives the same leaves") {
         const fs::path mesh = scratch(name), folder = scratch(std::string("tiles of ") + name);
         writeMesh(mesh, sphere);
         const nlohmann::json manifest =
-            builtTiles(tiledBuild(mesh, folder, "5x5x5", {"--resolution", "160", "--memory", "250"}));
+            built(withNormals(mesh, folder, "5x5x5", {"--resolution", "160", "--memory", "250"}));
         CHECK(manifest["sorting"]["streamed"] == true);
         CHECK(manifest["mesh"]["hash"].is_null());
         CHECK(manifest["mesh"]["triangles"] == sphere.triangles.size());
         CHECK(manifest["sum"]["peakRssBytes"].get<double>() < 250.0 * (1 << 20));
-        const LevelSet whole =
-            readVdb(fieldInOnePiece(mesh, "whole.vdb", {"--resolution", "160", "--sign", "normals"}));
+        const LevelSet whole = inOnePiece(mesh, {"--resolution", "160", "--sign", "normals"});
         CHECK(sameTrees(*merged(folder).grids().distance, *whole.grids().distance));
         fs::remove(mesh);
     }
@@ -133,7 +83,7 @@ TEST_CASE("a mesh that is not read whole gives the same leaves") {
 
 TEST_CASE("a build that was killed continues with the missing tiles") {
     const fs::path mesh = largeMeshFile("killed.ply"), folder = scratch("killed");
-    const Words words = tiledBuild(mesh, folder, "4x4x2", {"--resolution", "300", "--threads", "1"});
+    const Words words = withNormals(mesh, folder, "4x4x2", {"--resolution", "300", "--threads", "1"});
     const pid_t process = start(words);
     const auto count = [&](const std::string& ending) {
         std::error_code absent;
@@ -147,7 +97,7 @@ TEST_CASE("a build that was killed continues with the missing tiles") {
     const std::size_t before = count(".vdb");
     REQUIRE(before >= 3);
     CHECK(!fs::exists(folder / "manifest.json"));
-    requireRefusal({"merge", folder.string(), "-o", scratch("killed.vdb").string()}, 1, "manifest.json: no such file");
+    checkRefusal({"merge", folder.string(), "-o", scratch("killed.vdb").string()}, 1, "manifest.json: no such file");
 
     // what is there stays: a file of the first run keeps its time
     std::map<fs::path, fs::file_time_type> times;
@@ -157,16 +107,15 @@ TEST_CASE("a build that was killed continues with the missing tiles") {
             if (fs::exists(field)) times[field] = fs::last_write_time(field);
         }
     REQUIRE(!times.empty());
-    builtTiles(words);
+    built(words);
     for (const auto& [path, time] : times) CHECK(fs::last_write_time(path) == time);
-    const Words whole{"--resolution", "300", "--sign", "normals"};
-    CHECK(sameFields(merged(folder), readVdb(fieldInOnePiece(mesh, "unkilled.vdb", whole))));
+    CHECK(sameFields(merged(folder), inOnePiece(mesh, {"--resolution", "300", "--sign", "normals"})));
 }
 
 TEST_CASE("a tile with a wrong byte is found and built again") {
     const fs::path mesh = largeMeshFile("byte.ply"), folder = scratch("byte");
-    const Words words = tiledBuild(mesh, folder, "2x2x1", {"--resolution", "100"});
-    const nlohmann::json manifest = builtTiles(words);
+    const Words words = withNormals(mesh, folder, "2x2x1", {"--resolution", "100"});
+    const nlohmann::json manifest = built(words);
     const fs::path damaged = folder / manifest["tiles"][1]["file"].get<std::string>();
     const fs::path removed = folder / manifest["tiles"][2]["file"].get<std::string>();
     const std::string bytes = ownBytes(damaged), others = ownBytes(removed);
@@ -174,56 +123,55 @@ TEST_CASE("a tile with a wrong byte is found and built again") {
     wrong[wrong.size() / 2] ^= 1;
     std::ofstream(damaged, std::ios::binary) << wrong;
     fs::remove(removed);
-    requireRefusal({"merge", folder.string(), "-o", scratch("byte.vdb").string()}, 1,
-                   damaged.filename().string() + ": is missing or damaged");
+    checkRefusal({"merge", folder.string(), "-o", scratch("byte.vdb").string()}, 1,
+                 damaged.filename().string() + ": is missing or damaged");
     CHECK(!fs::exists(scratch("byte.vdb")));
-    const nlohmann::json again = builtTiles(words);
+    const nlohmann::json again = built(words);
     CHECK(ownBytes(damaged) == bytes);
     CHECK(ownBytes(removed) == others);
     CHECK(again["tiles"][0] == manifest["tiles"][0]);
     // nothing is missing: nothing is built
-    CHECK(builtTiles(words)["tiles"] == again["tiles"]);
+    CHECK(built(words)["tiles"] == again["tiles"]);
 }
 
 TEST_CASE("memory is stated and kept, or the build is refused before its first tile") {
     const fs::path mesh = largeMeshFile("memory.ply"), folder = scratch("memory");
     const Words size{"--resolution", "500"};
-    requireRefusal(tiledBuild(mesh, folder, "1x1x1", joined(size, {"--memory", "155"})), 1,
-                   "the largest of 1 tiles needs about");
+    checkRefusal(withNormals(mesh, folder, "1x1x1", joined(size, {"--memory", "155"})), 1,
+                 "the largest of 1 tiles needs about");
     CHECK(!fs::exists(folder / "tile_0_0_0.vdb"));
     fs::remove_all(folder);
-    const nlohmann::json manifest = builtTiles(tiledBuild(mesh, folder, "4x4x2", joined(size, {"--memory", "300"})));
+    const nlohmann::json manifest = built(withNormals(mesh, folder, "4x4x2", joined(size, {"--memory", "300"})));
     CHECK(manifest["sum"]["peakRssBytes"].get<double>() < 300.0 * (1 << 20));
     const fs::path object = scratch("memory.obj");
     writeMesh(object, shapes::sphere(1, 8));
-    requireRefusal(tiledBuild(object, scratch("object"), "2x2x2", {"--resolution", "50", "--memory", "130"}), 1,
-                   "reading it whole needs about");
+    checkRefusal(withNormals(object, scratch("object"), "2x2x2", {"--resolution", "50", "--memory", "130"}), 1,
+                 "reading it whole needs about");
 }
 
 TEST_CASE("tiles refuse what needs the whole field, by name") {
     const fs::path mesh = sphereFile(), folder = scratch("refused");
     const auto refused = [&](const Words& options, const std::string& culprit, int status = 2) {
         const Words words{"build", mesh.string(), "-o", folder.string(), "--tiles", "2x1x1", "--voxel-size", "0.01"};
-        requireRefusal(joined(words, options), status, culprit);
+        checkRefusal(joined(words, options), status, culprit);
         CHECK(!fs::exists(folder));
     };
-    const Words normals{"--sign", "normals"};
     refused({"--method", "pseudonormal", "--sign", "normals"}, "tiles have no method pseudonormal");
     refused(joined(normals, {"--union"}), "tiles have no union");
     refused(joined(normals, {"--body"}), "--body: is not for --tiles");
     refused(joined(normals, {"--extend"}), "--extend: is not for --tiles");
     refused(joined(normals, {"--half-float"}), "--half-float: is not for --tiles");
     refused(joined(normals, {"--report"}), "--report: is not for --tiles");
-    requireRefusal({"build", mesh.string(), "-o", folder.string(), "--voxel-size", "0.01", "--memory", "100"}, 2,
-                   "--tiles");
+    checkRefusal({"build", mesh.string(), "-o", folder.string(), "--voxel-size", "0.01", "--memory", "100"}, 2,
+                 "--tiles");
     for (const char* tiles : {"2", "2x2", "0x1x1", "2x2x2x2", "axbxc"}) {
         CAPTURE(tiles);
-        requireRefusal(tiledBuild(mesh, folder, tiles, {"--voxel-size", "0.01"}), 2, "three counts");
+        checkRefusal(withNormals(mesh, folder, tiles, {"--voxel-size", "0.01"}), 2, "three counts");
     }
-    requireRefusal(tiledBuild(mesh, folder, "90x1x1", {"--voxel-size", "0.01"}), 1, "90 tiles along x");
+    checkRefusal(withNormals(mesh, folder, "90x1x1", {"--voxel-size", "0.01"}), 1, "90 tiles along x");
     fs::remove_all(folder);
-    builtTiles(tiledBuild(mesh, folder, "2x1x1", {"--voxel-size", "0.01"}));
-    requireRefusal(tiledBuild(mesh, folder, "2x1x1", {"--voxel-size", "0.02"}), 1,
-                   "holds tiles of another mesh or with other options");
+    built(withNormals(mesh, folder, "2x1x1", {"--voxel-size", "0.01"}));
+    checkRefusal(withNormals(mesh, folder, "2x1x1", {"--voxel-size", "0.02"}), 1,
+                 "holds tiles of another mesh or with other options");
 }
 }  // namespace bilayer::tiles_test
