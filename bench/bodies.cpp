@@ -11,6 +11,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -33,13 +34,26 @@ namespace fs = std::filesystem;
 constexpr float seconds = 2.5f;  // of each drop
 // contacts know the depth of a penetration up to this width
 constexpr float interiorWidthVoxels = 6;
-constexpr test::DropPlace places[] = {{0.3f, {0.1f, -0.05f}}, {-2.1f, {-0.15f, 0.1f}}};
+constexpr float maxOffset = 0.3f;  // of a body from the centre of the ground, along x and y [m]
 
 struct Options {
     fs::path meshes = corpusFolder(), markdownFile;
     std::vector<std::string> names;
     float resolution = 96;
+    int drops = 12;
 };
+
+/// The same places for every mesh and ground.
+std::vector<test::DropPlace> places(int drops) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<float> rotation(-3.14f, 3.14f), offset(-maxOffset, maxOffset);
+    std::vector<test::DropPlace> all;
+    for (int i = 0; i < drops; ++i) {
+        const float x = offset(random), y = offset(random);
+        all.push_back({rotation(random), {x, y}});
+    }
+    return all;
+}
 
 /// The worst of the drops on a ground.
 struct GroundResult {
@@ -83,7 +97,7 @@ Row measure(const std::string& name, const Mesh& mesh, const Options& options, c
     if (!hasVolume(*collider)) return row;
     for (const test::Ground& ground : all) {
         GroundResult worst;
-        for (const test::DropPlace& place : places) {
+        for (const test::DropPlace& place : places(options.drops)) {
             const test::Drop drop = test::drop(collider, *ground.shape, place, seconds);
             worst = {std::max(worst.gain, drop.gain), worst.fell || drop.fell};
         }
@@ -164,6 +178,9 @@ int run(int argc, char** argv) {
     app.add_option("--mesh", options.names, "names in that folder; by default all");
     app.add_option("--resolution", options.resolution, "voxels along the longest side")
         ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--drops", options.drops, "drops of each mesh on each ground")
+        ->check(CLI::Range(1, 1000))
         ->capture_default_str();
     app.add_option("--markdown", options.markdownFile, "also write the table to this file");
     CLI11_PARSE(app, argc, argv);
