@@ -17,7 +17,8 @@ inputs=("$build/corpus/$name" "$seeds/$name")
 dictionary=()
 [[ ! -s $seeds/$name.dict ]] || dictionary=(-dict="$seeds/$name.dict")
 result=0
-"$build/fuzzer" -max_total_time="$seconds" -timeout="$limit" -rss_limit_mb=3000 -malloc_limit_mb=1000 \
+"$build/fuzzer" -max_total_time="$seconds" -timeout="$limit" -report_slow_units="$limit" \
+  -rss_limit_mb=3000 -malloc_limit_mb=1000 \
   -max_len="$("$build/fuzzer" --list | sed -n "s/^$name //p")" "${dictionary[@]}" -print_final_stats=1 \
   -artifact_prefix="$build/findings/$name-" "${inputs[@]}" >"$build/$name.log" 2>&1 || result=1
 echo "$name: $(sed -n 's/^stat::number_of_executed_units: *//p' "$build/$name.log") inputs"
