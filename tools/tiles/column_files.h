@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The files of column sums, by which tiles know the winding numbers below them.
-// Tested by tests/tools/tile_signs.cpp through run().
+// Tested by tests/tools/tile_signs.cpp through sameInTiles().
 #pragma once
 
 #include <cstdint>
