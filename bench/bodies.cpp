@@ -95,9 +95,10 @@ Row measure(const std::string& name, const Mesh& mesh, const Options& options, c
     const auto collider = std::make_shared<Collider>(mesh, field);
     Row row{name, field.sign(), inspect(mesh).commonWall / voxelSize, {}};
     if (!hasVolume(*collider)) return row;
+    const std::vector<test::DropPlace> dropPlaces = places(options.drops);
     for (const test::Ground& ground : all) {
         GroundResult worst;
-        for (const test::DropPlace& place : places(options.drops)) {
+        for (const test::DropPlace& place : dropPlaces) {
             const test::Drop drop = test::drop(collider, *ground.shape, place, seconds);
             worst = {std::max(worst.gain, drop.gain), worst.fell || drop.fell};
         }

@@ -57,7 +57,7 @@ inline unsigned boundHeights(const OrientedBoxes& group, const GroupFrame& frame
     return below;
 }
 
-/// The least height of the triangles below a node along a direction. By branch and bound, lowest box first.
+/// The minimum height of the triangles below a node along a direction. By branch and bound, lowest box first.
 inline double minHeight(PosedTree& mesh, std::uint32_t top, const glm::dvec3& direction) {
     struct Pending {
         double bound;
@@ -65,19 +65,19 @@ inline double minHeight(PosedTree& mesh, std::uint32_t top, const glm::dvec3& di
     };
     std::array<Pending, PosedTree::maxPending> stack;
     std::size_t pending = 0;
-    double least = std::numeric_limits<double>::infinity();
-    stack[pending++] = {-least, top};
+    double lowest = std::numeric_limits<double>::infinity();
+    stack[pending++] = {-lowest, top};
     while (pending > 0) {
         const auto [bound, node] = stack[--pending];
-        if (!(bound < least)) continue;
+        if (!(bound < lowest)) continue;
         if (mesh.tree().isLeaf(node)) {
-            least = std::min(least, mesh.minHeight(node, direction));
+            lowest = std::min(lowest, mesh.minHeight(node, direction));
             continue;
         }
         const OrientedBoxes& group = mesh.group(node);
         const auto first = std::ptrdiff_t(pending);
         alignas(64) double bounds[treeWidth];
-        unsigned below = boundHeights(group, mesh.frameOf(group), direction, least, bounds);
+        unsigned below = boundHeights(group, mesh.frameOf(group), direction, lowest, bounds);
         for (; below != 0; below &= below - 1) {
             const auto slot = std::uint32_t(std::countr_zero(below));
             stack[pending++] = {bounds[slot], group.firstChild + slot};
@@ -85,10 +85,10 @@ inline double minHeight(PosedTree& mesh, std::uint32_t top, const glm::dvec3& di
         std::sort(stack.begin() + first, stack.begin() + std::ptrdiff_t(pending),
                   [](const Pending& p, const Pending& q) { return p.bound > q.bound; });
     }
-    return least;
+    return lowest;
 }
 
-/// The least heights of nodes of a mesh along a direction, kept for nodes that are asked for again.
+/// The minimum heights of nodes of a mesh along a direction, kept for nodes that are asked for again.
 class NodeHeights {
   public:
     void setDirection(const glm::dvec3& direction) {

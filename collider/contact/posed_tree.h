@@ -113,15 +113,15 @@ class PosedTree {
         return {posed(mesh.points[t.x]), posed(mesh.points[t.y]), posed(mesh.points[t.z])};
     }
 
-    /// The least height of the triangles of a leaf along a direction of the common frame.
+    /// The minimum height of the triangles of a leaf along a direction of the common frame.
     double minHeight(std::uint32_t leaf, const glm::dvec3& direction) const {
         const Mesh& mesh = mesh_.mesh();
         const glm::dvec3 inMesh = direction * linear_;
-        double least = std::numeric_limits<double>::infinity();
+        double lowest = std::numeric_limits<double>::infinity();
         for (const std::uint32_t triangle : tree().leaves[leaf].triangles)
             for (int k = 0; k < 3; ++k)
-                least = std::min(least, glm::dot(inMesh, glm::dvec3(mesh.points[mesh.triangles[triangle][k]])));
-        return least + glm::dot(direction, map_.shift);
+                lowest = std::min(lowest, glm::dot(inMesh, glm::dvec3(mesh.points[mesh.triangles[triangle][k]])));
+        return lowest + glm::dot(direction, map_.shift);
     }
 
     /// The triangle nearest to a point of the common frame, and its closest point.

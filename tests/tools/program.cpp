@@ -96,6 +96,19 @@ int wait(pid_t process) {
     return statusOf(status);
 }
 
+Words joined(Words words, const Words& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+}
+
+nlohmann::json built(const Words& words) {
+    const Result r = run(words);
+    INFO(r.err);
+    REQUIRE(r.status == 0);
+    CHECK(r.err.empty());
+    return r.json();
+}
+
 std::filesystem::path sphereFile(const std::string& name, int levels) {
     const std::filesystem::path path = scratch(name);
     if (!std::filesystem::exists(path)) writeMesh(path, shapes::sphere(0.5f, levels));
@@ -113,13 +126,7 @@ std::string fieldFile() {
 }
 
 nlohmann::json buildSphere(const std::string& output, const Words& options) {
-    Words words{"build", sphereFile().string(), "-o", output, "--json"};
-    words.insert(words.end(), options.begin(), options.end());
-    const Result r = run(words);
-    INFO(r.err);
-    REQUIRE(r.status == 0);
-    CHECK(r.err.empty());
-    return r.json();
+    return built(joined({"build", sphereFile().string(), "-o", output, "--json"}, options));
 }
 
 std::string rejectedOutput() {
@@ -127,9 +134,7 @@ std::string rejectedOutput() {
 }
 
 Words rejectedBuild(const std::filesystem::path& mesh, Words options) {
-    Words words{"build", mesh.string(), "-o", rejectedOutput()};
-    words.insert(words.end(), options.begin(), options.end());
-    return words;
+    return joined({"build", mesh.string(), "-o", rejectedOutput()}, options);
 }
 
 std::filesystem::path textFile(const std::string& name, const std::string& text) {

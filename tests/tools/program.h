@@ -43,6 +43,11 @@ pid_t start(const Words& arguments);
 /// Waits for a process; returns the exit status, or 128 plus the signal.
 int wait(pid_t process);
 
+Words joined(Words words, const Words& more);
+
+/// Runs a command without a message on stderr. Returns its JSON.
+nlohmann::json built(const Words& words);
+
 /// A sphere of radius 0.5 as a mesh file.
 std::filesystem::path sphereFile(const std::string& name = "sphere.ply", int levels = 3);
 

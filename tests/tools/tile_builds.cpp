@@ -11,19 +11,6 @@ namespace bilayer::test {
 
 namespace fs = std::filesystem;
 
-Words joined(Words words, const Words& more) {
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
-}
-
-nlohmann::json built(const Words& words) {
-    const Result r = run(words);
-    INFO(r.err);
-    REQUIRE(r.status == 0);
-    CHECK(r.err.empty());
-    return r.json();
-}
-
 Words tiled(const fs::path& mesh, const fs::path& folder, const std::string& tiles, const Words& options) {
     return joined({"build", mesh.string(), "-o", folder.string(), "--tiles", tiles, "--json"}, options);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fields that `bilayer build --tiles` builds, beside those of `bilayer build`.
+// Builds in tiles, and the same fields in one piece.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +10,6 @@
 #include "tests/tools/program.h"
 
 namespace bilayer::test {
-
-Words joined(Words words, const Words& more);
-
-/// Runs a build without a message on stderr. Returns its JSON.
-nlohmann::json built(const Words& words);
 
 /// The words of a build in tiles.
 Words tiled(const std::filesystem::path& mesh, const std::filesystem::path& folder, const std::string& tiles,

@@ -10,15 +10,15 @@
 #include <limits>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <bilayer/collider/field.h>
 #include <bilayer/sdf/mesh_io.h>
-#include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "tests/tools/program.h"
+#include "tests/tools/tile_builds.h"
 
 namespace bilayer::tiled_field_test {
 using namespace bilayer::test;
@@ -39,15 +39,10 @@ struct Tiles {
 
 Tiles builtTiles(const std::string& name, const Mesh& mesh, const std::string& tiles, const Words& options,
                  const std::string& sign = "normals") {
-    const fs::path file = scratch(name + ".ply"), folder = scratch(name), merged = scratch(name + ".vdb");
+    const fs::path file = scratch(name + ".ply"), folder = scratch(name);
     writeMesh(file, mesh);
-    Words words{"build", file.string(), "-o", folder.string(), "--tiles", tiles, "--sign", sign, "--json"};
-    words.insert(words.end(), options.begin(), options.end());
-    const Result built = run(words);
-    INFO(built.err);
-    REQUIRE(built.status == 0);
-    REQUIRE(run({"merge", folder.string(), "-o", merged.string()}).status == 0);
-    return {folder, built.json(), readVdb(merged), mesh};
+    nlohmann::json manifest = built(tiled(file, folder, tiles, joined({"--sign", sign}, options)));
+    return {folder, std::move(manifest), merged(folder), mesh};
 }
 
 Tiles knot(const std::string& name, const std::string& tiles, const Words& options) {
