@@ -23,7 +23,7 @@ using Triangle = std::array<glm::vec3, 3>;
 
 /// The triangles of a height field, or of a mesh of another library, as they are asked for. They are an open surface:
 /// both sides of a triangle are outside, and nothing is inside. Triangles that share an edge or a vertex have equal
-/// coordinates there, to the bit.
+/// coordinates there, to the bit. A triangle with a corner that is not finite touches nothing.
 struct TriangleSheet {
     /// @param id  a number of the triangle that no other has, the same at each call
     using Visitor = std::function<void(const Triangle& triangle, std::uint64_t id)>;

@@ -34,7 +34,8 @@ std::optional<Real> firstNear(Real length, Real tolerance, Real left, int maxSte
 template <class ClearanceAt>
 bool staysClear(const glm::vec3& from, const glm::vec3& to, float minClearance, ClearanceAt&& clearanceAt) {
     constexpr int maxSteps = 64;
-    const float length = glm::distance(from, to);
+    // in double precision: the square of a length above 1e19 is no float
+    const auto length = float(glm::distance(glm::dvec3(from), glm::dvec3(to)));
     const auto along = [&](float travelled) {
         return clearanceAt(length > 0 ? from + travelled / length * (to - from) : from);
     };

@@ -26,6 +26,7 @@ std::uint64_t mixed(std::uint64_t bits) {
 
 void NearbyTriangles::add(const Triangle& triangle, std::uint64_t id) {
     const Triangle corners{inField_.toWorld(triangle[0]), inField_.toWorld(triangle[1]), inField_.toWorld(triangle[2])};
+    if (!isFinite(corners)) return;
     const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
     float radius = 0;
     for (int i = 0; i < 3; ++i) radius = std::max(radius, glm::distance(corners[i], middle));

@@ -130,6 +130,7 @@ Adjacency::Groups Adjacency::groupBy(KeyOf&& keyOf) const {
     groups.first.resize(keys.size());
     groups.end.resize(keys.size());
     for (std::uint32_t first = 0, end = 0; first < keys.size(); first = end) {
+        end = first + 1;  // a coordinate that is no number equals nothing, not even itself
         while (end < keys.size() && keys[end].first == keys[first].first) ++end;
         for (std::uint32_t k = first; k < end; ++k) {
             const std::uint32_t at = keys[k].second;
@@ -203,6 +204,7 @@ std::vector<Triangle> trianglesAlong(const TriangleSheet& sheet, std::span<const
     std::vector<Triangle> triangles;
     const TriangleSheet::Visitor add = [&](const Triangle& triangle, std::uint64_t) {
         const auto& [a, b, c] = triangle;
+        if (!isFinite(triangle)) return;
         if (passed.insert({a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z}).second) triangles.push_back(triangle);
     };
     for (std::size_t i = 0; i + 1 < path.size(); ++i) {

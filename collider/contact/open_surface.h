@@ -13,12 +13,17 @@
 #include <bilayer/collider/shapes.h>
 
 #include "collider/contact/sharp_edges.h"
+#include "sdf/base/finite.h"
 
 namespace bilayer::detail {
 
 /// The conormal of an edge: in the triangle's plane, from an edge into the triangle, of unit length. The edge runs
 /// from that vertex to the next. Zero if the triangle has no area.
 glm::vec3 conormalOf(const Triangle& triangle, int edge);
+
+inline bool isFinite(const Triangle& triangle) {
+    return isFinite(triangle[0]) && isFinite(triangle[1]) && isFinite(triangle[2]);
+}
 
 /// Adjacency of triangles by edge and vertex. Features are shared if their coordinates are equal to the bit. Edge i of
 /// a triangle runs from its vertex i to the next one.

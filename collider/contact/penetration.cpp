@@ -51,7 +51,7 @@ constexpr float startHeight = 0.01f;
 // radius.
 constexpr float maxChordAngle = 0.1f;
 constexpr int maxProbes = 1 << 20;     // along an edge; distant ones are skipped
-constexpr float arcOverChord = 1.12f;  // length of an arc of a rim over its chord, up to a quarter of the rim
+constexpr double arcOverChord = 1.12;  // length of an arc of a rim over its chord, up to a quarter of the rim
 
 /// Transforms coordinates of the points' shape into those of the surface at some time of the step.
 struct StepTransform : BodyTransform {
@@ -71,6 +71,11 @@ std::vector<StepTransform> stepTransforms(const SweptShape& points, const SweptS
         transforms.push_back({BodyTransform(from, points.scale, into, surface.scale), time});
     }
     return transforms;
+}
+
+/// In double precision: the square of a length above 1e19 is no float.
+double lengthBetween(const glm::vec3& a, const glm::vec3& b) {
+    return glm::distance(glm::dvec3(a), glm::dvec3(b));
 }
 
 /// A point of a body, grown by a radius.
@@ -107,7 +112,7 @@ class PointSweep {
         const auto vertices = convex.vertices();
         for (std::uint32_t i = 0; i < vertices.size(); ++i) follow(pointAt(vertices[i], convex.radius(i)));
         for (const Convex::Edge& edge : convex.edges())
-            followEdge(glm::distance(vertices[edge.from], vertices[edge.to]), voxel, [&](float fraction) {
+            followEdge(lengthBetween(vertices[edge.from], vertices[edge.to]), voxel, [&](float fraction) {
                 return pointAt(convex.place(edge, fraction), convex.radius(edge, fraction));
             });
     }
@@ -116,7 +121,7 @@ class PointSweep {
     void follow(const SharpFeatures& sharp, float voxel) {
         for (const SharpFeatures::OutwardVertex& vertex : sharp.vertices) follow({vertex.place, vertex.outward});
         for (const SharpFeatures::OutwardEdge& edge : sharp.edges)
-            followEdge(glm::distance(edge.from, edge.to), voxel, [&](float fraction) {
+            followEdge(lengthBetween(edge.from, edge.to), voxel, [&](float fraction) {
                 return RoundedPoint{glm::mix(edge.from, edge.to, fraction), edge.outward};
             });
     }
@@ -201,21 +206,21 @@ class PointSweep {
     /// @param voxel    of the field that is met, in the same units
     /// @param pointAt  (float fraction) -> RoundedPoint
     template <class PointAt>
-    void followEdge(float length, float voxel, const PointAt& pointAt) {
-        const int intervals = probeIntervals(length, voxel, maxProbes);
+    void followEdge(double length, float voxel, const PointAt& pointAt) {
+        const int intervals = probeIntervals(float(length), voxel, maxProbes);
         const float radius = std::max(pointAt(0.f).radius, pointAt(1.f).radius);
-        followBetween(0, intervals, arcOverChord * length / float(intervals), radius,
+        followBetween(0, intervals, arcOverChord * length / intervals, radius,
                       [&](int i) { return pointAt(float(i) / float(intervals)); });
     }
 
     /// Follows the points with numbers in between, if any of them may come near.
     /// @param length, radius  from one point to the next, and of the largest point
     template <class PointAt>
-    void followBetween(int from, int to, float length, float radius, const PointAt& pointAt) {
+    void followBetween(int from, int to, double length, float radius, const PointAt& pointAt) {
         if (to - from < 2) return;
         const int middle = from + (to - from) / 2;
         const RoundedPoint rounded = pointAt(middle);
-        if (!comesNear(rounded.place, scale_ * (float(to - middle) * length + radius))) return;
+        if (!comesNear(rounded.place, scale_ * (float((to - middle) * length) + radius))) return;
         follow(rounded);
         followBetween(from, middle, length, radius, pointAt);
         followBetween(middle, to, length, radius, pointAt);

@@ -12,6 +12,7 @@
 #include <bilayer/collider/contact.h>
 #include <bilayer/collider/distance.h>
 #include <bilayer/collider/field.h>
+#include <bilayer/collider/shapes.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/analytic.h"
@@ -350,6 +351,35 @@ TEST_CASE("distances and impacts of bodies anywhere, of any size, along any path
         }
         const Impact impact = timeOfImpact(a, b);
         if (impact.found) REQUIRE((impact.fraction >= 0 && impact.fraction <= 1));
+    }
+}
+
+TEST_CASE("a body collides with triangles anywhere, of any numbers") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Extremes extreme(seed);
+    for (int i = 0; i < 300; ++i) {
+        CAPTURE(i);
+        const auto corner = [&] { return i % 3 ? extreme.vector() : glm::vec3(extreme(-1, 1), 0.1f, extreme(-1, 1)); };
+        std::vector<Triangle> triangles{{corner(), corner(), corner()}, {corner(), corner(), corner()}};
+        triangles.push_back({triangles[0][0], triangles[0][1], extreme.vector()});
+        const TriangleSheet sheet{[&](const Bounds&, const TriangleSheet::Visitor& visitor) {
+            for (std::size_t t = 0; t < triangles.size(); ++t) visitor(triangles[t], t);
+        }};
+        PlacedShape body{ContactShape(ball())}, ground{ContactShape::triangles(sheet)};
+        if (i % 2) ground.pose.position = extreme.vector();
+        if (i % 5 == 0) body.pose.position = extreme.vector();
+        if (i % 7 == 0) body.motion = {extreme.vector(), extreme.vector()};
+        std::vector<Contact> contacts;
+        collide(body, ground, unfiltered(voxel, i % 11 == 0), contacts);
+        collide(ground, body, unfiltered(voxel, i % 11 == 0), contacts);
+        for (const Contact& contact : contacts) REQUIRE((isFinite(contact.position) && isFinite(contact.normal)));
+        REQUIRE_FALSE(std::isnan(distance(body, ground).distance));
+        body.motion = {glm::vec3(extreme(-1, 1), extreme(-1, 1), 0), glm::vec3(1, 0, 0)};
+        for (const bool penetration : {false, true}) {
+            const Impact impact = timeOfImpact(body, ground, {.penetration = penetration});
+            if (impact.found) REQUIRE((impact.fraction >= 0 && impact.fraction <= 1));
+        }
     }
 }
 }  // namespace bilayer::extremes_test
