@@ -11,7 +11,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -23,6 +22,7 @@
 #include "bench/builders.h"
 #include "bench/program.h"
 #include "tests/support/drops.h"
+#include "tests/support/random_pose.h"
 
 using namespace bilayer;
 using namespace bilayer::bench;
@@ -34,7 +34,7 @@ namespace fs = std::filesystem;
 constexpr float seconds = 2.5f;  // of each drop
 // contacts know the depth of a penetration up to this width
 constexpr float interiorWidthVoxels = 6;
-constexpr float maxOffset = 0.3f;  // of a body from the centre of the ground, along x and y [m]
+constexpr double maxOffset = 0.3;  // of a body from the centre of the ground, along x and y [m]
 
 struct Options {
     fs::path meshes = corpusFolder(), markdownFile;
@@ -43,14 +43,13 @@ struct Options {
     int drops = 12;
 };
 
-/// The same places for every mesh and ground.
+/// The same for every mesh and ground.
 std::vector<test::DropPlace> places(int drops) {
-    std::mt19937 random(7);
-    std::uniform_real_distribution<float> rotation(-3.14f, 3.14f), offset(-maxOffset, maxOffset);
+    test::Random random(7);
     std::vector<test::DropPlace> all;
     for (int i = 0; i < drops; ++i) {
-        const float x = offset(random), y = offset(random);
-        all.push_back({rotation(random), {x, y}});
+        const glm::quat rotation = test::randomRotation(random);
+        all.push_back({rotation, glm::vec2(random.point(maxOffset))});
     }
     return all;
 }

@@ -74,7 +74,8 @@ const Mesh* Field::mesh() const noexcept {
     return data_->mesh ? &data_->mesh->mesh() : nullptr;
 }
 std::size_t Field::memoryBytes() const noexcept {
-    return data_->memoryBytes() + data_->entries.memoryBytes() + (data_->mesh ? data_->mesh->memoryBytes() : 0);
+    return data_->memoryBytes() + data_->entries.memoryBytes() + (data_->mesh ? data_->mesh->memoryBytes() : 0) +
+           (data_->winding ? data_->winding->memoryBytes() : 0);
 }
 
 }  // namespace bilayer

@@ -15,6 +15,7 @@
 #include "collider/contact/collider_data.h"
 #include "collider/field/moments.h"
 #include "sdf/base/method_names.h"
+#include "sdf/bvh/winding_number.h"
 #include "sdf/sign/fill_holes.h"
 #include "sdf/sign/sign_choice.h"
 
@@ -59,6 +60,13 @@ Filled filledMesh(Mesh outward, const LevelSet& levelSet) {
     return {std::move(filled.mesh), std::move(closed)};
 }
 
+// Only an open mesh has open surfaces.
+SurfacePoints pointsOf(const Mesh& mesh, const LevelSet& levelSet, float spacing) {
+    if (levelSet.sign() != nameOf(Sign::winding) || balanced(mesh)) return {mesh, spacing};
+    const WindingNumber winding(mesh);
+    return {mesh, spacing, [&](const glm::dvec3& place) { return !winding.isInside(place); }};
+}
+
 Field fieldOf(const LevelSet& levelSet, const Body& body) {
     Field samples(levelSet);
     return body.mesh && body.accuracy != ContactAccuracy::samples ? fieldWithMesh(samples, body.mesh) : samples;
@@ -75,7 +83,7 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
     auto mass = meshOrFieldMass(oriented, levelSet);
     Filled filled = filledMesh(outerSurface(levelSet, std::move(oriented)), levelSet);
     const auto mesh = std::make_shared<const Mesh>(std::move(filled.mesh));
-    return {.points = SurfacePoints(*mesh, options.pointSpacingVoxels * levelSet.voxelSize()),
+    return {.points = pointsOf(*mesh, levelSet, options.pointSpacingVoxels * levelSet.voxelSize()),
             .bounds = bounds(*mesh),
             .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
             .mass = std::move(mass),

@@ -40,6 +40,8 @@ constexpr float level = 0.09f;
 constexpr float minBend = 0.0872f;
 // Distance from an edge at which its faces are sampled [voxels].
 constexpr float conormalOffset = 1.5f;
+// Min length of the way along a face from an edge to where it is sampled [voxels].
+constexpr float minConormal = 0.1f;
 // Tolerance for the ends of an edge's segments, relative to their length.
 constexpr float endTolerance = 0.02f;
 // Min count of points, within the neighbour distance, to surround a point.
@@ -97,8 +99,10 @@ Conormals conormalsOf(const SurfacePoint& a, const SurfacePoint& b, const Field&
             const Sample sample = field.sample(place);
             if (sample.inBand) place -= sample.distance * sample.gradient;
         }
-        const glm::vec3 offset = place - middle;
-        return glm::normalize(offset - glm::dot(offset, along) * along);
+        const glm::vec3 offset = place - middle, conormal = offset - glm::dot(offset, along) * along;
+        const float length = glm::length(conormal);
+        // from both sides of an open surface, its border is nearest
+        return length > minConormal * field.voxelSize() ? conormal / length : -glm::normalize(a.normal + b.normal);
     };
     return {conormal(-1), conormal(1)};
 }

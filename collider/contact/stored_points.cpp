@@ -33,6 +33,7 @@ constexpr const char* position = "P";
 constexpr const char* normal = "N";
 constexpr const char* feature = "id";
 constexpr const char* sharp = "sharp";
+constexpr const char* back = "back";
 }  // namespace attribute
 
 // The edge of a point voxel is a power of two. OpenVDB stores a point's place within its voxel; it is then a float
@@ -84,7 +85,8 @@ using Handle = openvdb::points::AttributeHandle<Value>;
 // OpenVDB asks for no more than the first attribute's size.
 void requireValues(const Points::TreeType::LeafNodeType& leaf) {
     leaf.validateOffsets();
-    for (const char* name : {attribute::position, attribute::normal, attribute::feature, attribute::sharp})
+    for (const char* name :
+         {attribute::position, attribute::normal, attribute::feature, attribute::sharp, attribute::back})
         if (leaf.constAttributeArray(name).dataSize() < openvdb::Index(leaf.getLastValue()))
             refuseBody(
                 fmt::format("surface points have fewer values of the attribute '{}' than there are points", name));
@@ -101,10 +103,11 @@ SurfacePoints load(const Points& grid) {
         const Handle<Vec3s> normal(leaf->constAttributeArray(attribute::normal));
         const Handle<std::int32_t> feature(leaf->constAttributeArray(attribute::feature));
         const Handle<std::int8_t> sharp(leaf->constAttributeArray(attribute::sharp));
+        const Handle<std::int8_t> back(leaf->constAttributeArray(attribute::back));
         for (auto index = leaf->beginIndexOn(); index; ++index) {
             const openvdb::Vec3d place = index.getCoord().asVec3d() + openvdb::Vec3d(position.get(*index));
-            collector.add(feature.get(*index),
-                          {toGlm(Vec3s(grid.indexToWorld(place))), toGlm(normal.get(*index)), sharp.get(*index) != 0});
+            collector.add(feature.get(*index), {toGlm(Vec3s(grid.indexToWorld(place))), toGlm(normal.get(*index)),
+                                                sharp.get(*index) != 0, back.get(*index) != 0});
         }
     }
     return SurfacePoints(collector.take());
@@ -127,6 +130,7 @@ openvdb::GridBase::ConstPtr storePoints(const SurfacePoints& surface, float voxe
                                [](std::size_t i) { return std::int32_t(i); });
     addAttribute<std::int8_t>(*grid, *index, attribute::sharp, points,
                               [&](std::size_t i) { return points[i].isSharp; });
+    addAttribute<std::int8_t>(*grid, *index, attribute::back, points, [&](std::size_t i) { return points[i].isBack; });
     grid->setName(contactPoints);
     return grid;
 }

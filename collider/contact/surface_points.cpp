@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sampling of surface points. Candidates are the vertices, and a lattice on edges and faces that are larger than the
-// spacing. They are thinned out in order of decreasing convexity, so that the points that touch first remain.
+// spacing. They are thinned out in order of decreasing convexity, so that the points that touch first remain. Open
+// surfaces have candidates on both sides, and on their borders, where the normals point away from the surface.
 #include "collider/contact/surface_points.h"
 
 #include <algorithm>
@@ -16,14 +17,16 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double latticePitch = 0.75;      // of candidates on edges and faces [spacings]
-constexpr double minGap = 0.7;             // min distance of points with about the same normal [spacings]
-constexpr double minLikeCosine = 0.7;      // min cosine between such normals: a cube's edge and its faces have 0.71
-constexpr double minProtrusion = 0.035;    // max height of a dropped candidate over such a point [spacings]
-constexpr double minCornerGap = 0.1;       // between convex vertices [spacings]: a fraction of a voxel
-constexpr double corner = 0.5;             // min convexity of a vertex: a cube's has 0.58
-constexpr double sharpConvexity = 0.15;    // min convexity of an edge: a cube's have 0.35
-constexpr std::uint32_t leafPoints = 8;    // max count of points in a leaf of the tree
+constexpr double latticePitch = 0.75;    // of candidates on edges and faces [spacings]
+constexpr double minGap = 0.7;           // min distance of points with about the same normal [spacings]
+constexpr double minLikeCosine = 0.7;    // min cosine between such normals: a cube's edge and its faces have 0.71
+constexpr double minProtrusion = 0.035;  // max height of a dropped candidate over such a point [spacings]
+constexpr double minCornerGap = 0.1;     // between convex vertices [spacings]: a fraction of a voxel
+constexpr double corner = 0.5;           // min convexity of a vertex: a cube's has 0.58
+constexpr double sharpConvexity = 0.15;  // min convexity of an edge: a cube's have 0.35
+constexpr double borderConvexity = 0.5;  // of the border of an open surface: as of the edge between two opposite faces
+constexpr double thinnestWall = 0.02;    // what is thinner is an open surface [spacings]
+constexpr std::uint32_t leafPoints = 8;  // max count of points in a leaf of the tree
 constexpr float sphereGrowth = 1.000001f;  // growth factor of spheres, against rounding in single precision
 
 struct Candidate {
@@ -31,6 +34,7 @@ struct Candidate {
     glm::dvec3 normal;
     double convexity;  // mean sine of the angle by which the surface recedes around the point; 0 on a plane, negative
                        // in a dent
+    bool isBack;       // of an open surface, or on its border
 };
 
 struct Edge {
@@ -47,14 +51,16 @@ double angleBetween(const glm::dvec3& a, const glm::dvec3& b) {
 // The candidates of a mesh, in a fixed order.
 class Candidates {
   public:
-    Candidates(const Mesh& mesh, double pitch) : mesh_(mesh), pitch_(pitch) {
+    Candidates(const Mesh& mesh, double spacing, const SurfacePoints::IsOutside& isOutside)
+        : mesh_(mesh), pitch_(latticePitch * spacing), thinnest_(thinnestWall * spacing), isOutside_(isOutside) {
         for (const glm::uvec3& t : mesh.triangles) {
             const glm::dvec3 normal = glm::cross(at(t.y) - at(t.x), at(t.z) - at(t.x));
             const double length = glm::length(normal);
             normals_.push_back(length > 0 ? normal / length : glm::dvec3(0));
         }
-        addVertices();
+        onBorder_.resize(mesh.points.size());
         addEdges();
+        addVertices();
         for (std::size_t i = 0; i < mesh.triangles.size(); ++i) addFace(mesh.triangles[i], normals_[i]);
     }
 
@@ -66,7 +72,20 @@ class Candidates {
     // Skips places where all triangles are degenerate: they have no outside.
     void add(const glm::dvec3& position, const glm::dvec3& direction, double convexity) {
         const double length = glm::length(direction);
-        if (length > 0) result.push_back({position, direction / length, convexity});
+        if (!(length > 0)) return;
+        const glm::dvec3 normal = direction / length;
+        result.push_back({position, normal, convexity, false});
+        if (isTwoSided(position, normal)) result.push_back({position, -normal, -convexity, true});
+    }
+
+    void addOnBorder(const glm::dvec3& position, const glm::dvec3& inward) {
+        const double length = glm::length(inward);
+        if (length > 0) result.push_back({position, -inward / length, borderConvexity, true});
+    }
+
+    // Whether the space behind a place is outside, too.
+    bool isTwoSided(const glm::dvec3& position, const glm::dvec3& normal) const {
+        return isOutside_ && isOutside_(position - thinnest_ * normal);
     }
 
     void addVertices() {
@@ -83,6 +102,7 @@ class Candidates {
         for (std::uint32_t v = 0; v < mesh_.points.size(); ++v) {
             const double length = glm::length(directions[v]);
             if (length > 0) add(at(v), directions[v], -glm::dot(neighbours[v], directions[v]) / (length * counts[v]));
+            if (onBorder_[v]) addOnBorder(at(v), neighbours[v]);
         }
     }
 
@@ -91,7 +111,7 @@ class Candidates {
         for (std::uint32_t i = 0; i < mesh_.triangles.size(); ++i)
             for (int k = 0; k < 3; ++k) {
                 const auto [low, high] = std::minmax(mesh_.triangles[i][k], mesh_.triangles[i][(k + 1) % 3]);
-                if (glm::distance(at(low), at(high)) > pitch_) edges.push_back({low, high, i});
+                if (isOutside_ || glm::distance(at(low), at(high)) > pitch_) edges.push_back({low, high, i});
             }
         std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
             return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
@@ -113,8 +133,21 @@ class Candidates {
         const double length = glm::length(direction);
         // half of the directions around an edge point are along the edge, where the surface does not recede
         const double convexity = length > 0 ? 0.5 * fall / (length * double(last - first)) : 0;
+        const bool border = isBorder(first, last);
+        if (border) onBorder_[first->low] = onBorder_[first->high] = true;
         const int parts = int(std::ceil(glm::length(along) / pitch_));
-        for (int i = 1; i < parts; ++i) add(a + double(i) / parts * along, direction, convexity);
+        for (int i = 1; i < parts; ++i) {
+            const glm::dvec3 position = a + double(i) / parts * along;
+            add(position, direction, convexity);
+            if (border) addOnBorder(position, inward(*first));
+        }
+    }
+
+    // Whether an edge is the border of an open surface.
+    bool isBorder(std::vector<Edge>::const_iterator first, std::vector<Edge>::const_iterator last) const {
+        if (last - first != 1) return false;
+        const glm::dvec3 middle = 0.5 * (at(first->low) + at(first->high));
+        return isTwoSided(middle + thinnest_ * inward(*first), normals_[first->triangle]);
     }
 
     // The conormal of an edge in its triangle.
@@ -145,8 +178,10 @@ class Candidates {
     }
 
     const Mesh& mesh_;
-    double pitch_;
+    const double pitch_, thinnest_;
+    const SurfacePoints::IsOutside& isOutside_;
     std::vector<glm::dvec3> normals_;  // of triangles; 0 if degenerate
+    std::vector<bool> onBorder_;       // for each vertex
 };
 
 // Points in a hashed grid, for neighbour search within the side of a cell.
@@ -205,8 +240,8 @@ std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing
         const double gap = candidate.convexity >= corner ? minCornerGap : minGap;
         if (grid.hasNeighbour(candidate, gap * spacing, minProtrusion * spacing)) continue;
         grid.insert(candidate);
-        points.push_back(
-            {glm::vec3(candidate.position), glm::vec3(candidate.normal), candidate.convexity >= sharpConvexity});
+        points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal),
+                          candidate.convexity >= sharpConvexity, candidate.isBack});
     }
     return points;
 }
@@ -250,12 +285,12 @@ void addNode(const std::vector<SurfacePoint>& points, std::vector<PointNode>& no
 
 }  // namespace
 
-SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing) {
+SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing, const IsOutside& isOutside) {
     if (!(spacing > 0 && std::isfinite(spacing)))
         throw std::invalid_argument("the spacing must be positive and finite");
     validate(mesh);
     const Mesh welded = weld(mesh);
-    points_ = thin(Candidates(welded, latticePitch * spacing).result, spacing);
+    points_ = thin(Candidates(welded, spacing, isOutside).result, spacing);
     if (points_.empty()) throw std::invalid_argument("all triangles of the mesh are degenerate");
     order(points_, 0, std::uint32_t(points_.size()));
     addNode(points_, nodes_, 0, std::uint32_t(points_.size()));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,9 @@ struct SurfacePoint {
     glm::vec3 position;  ///< [m]
     glm::vec3 normal;    ///< outward, of unit length
     bool isSharp;        ///< on a convex edge or vertex, where faces with different normals meet
+    /// On the back or the border of an open surface. Triangles of another body have two sides, too: only the front
+    /// tells which side of them the surface comes from, and these points do not touch them.
+    bool isBack = false;
 };
 
 /// A node of the tree: a bounding sphere of consecutive points. Nodes are in preorder: the first child of node i is i +
@@ -28,14 +32,19 @@ struct PointNode {
 
 /// Points distributed over a mesh's surface. Every place of the surface has a point with about the same normal within
 /// about `spacing`. On curved surfaces this point is at most about 0.05 `spacing` lower along the normal. Convex
-/// vertices and edges that are sharper than the surface around them have their own points. Deterministic.
+/// vertices and edges that are sharper than the surface around them have their own points. Open surfaces have points on
+/// both sides, and points on their borders whose normals point away from the surface. Deterministic.
 class SurfacePoints {
   public:
     SurfacePoints() = default;
 
+    /// Whether a place is outside of a body [m].
+    using IsOutside = std::function<bool(const glm::dvec3& place)>;
+
     /// Throws std::invalid_argument for an invalid mesh.
-    /// @param spacing  [m], positive and finite; otherwise throws std::invalid_argument
-    SurfacePoints(const Mesh& mesh, float spacing);
+    /// @param spacing    [m], positive and finite; otherwise throws std::invalid_argument
+    /// @param isOutside  finds open surfaces, which have the outside on both sides. Empty if there are none.
+    SurfacePoints(const Mesh& mesh, float spacing, const IsOutside& isOutside = {});
 
     /// From the points() of another one, in the same order; the nodes are equal bit for bit. Needs at least one point.
     explicit SurfacePoints(std::vector<SurfacePoint> ordered);

@@ -76,6 +76,9 @@ FieldData::FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outwa
       mesh(std::make_unique<MeshTree>(std::move(outward), voxelSize)),
       signedByNormals(samples.signedByNormals),
       signedByWinding(samples.signedByWinding && balanced(mesh->mesh())),
+      winding(samples.signedByWinding && !signedByNormals && !signedByWinding
+                  ? std::make_unique<const WindingNumber>(mesh->mesh())
+                  : nullptr),
       sampleError(samples.sampleError),
       error(sampleError) {
     fillLanes();
@@ -138,15 +141,17 @@ bool FieldData::confirms(const NearestFeature& nearest, const Side& side) const 
 }
 
 // The field decides where it is certain, so that all queries agree. Otherwise the normal decides for meshes signed by
-// normals, if the sample confirms it. Otherwise the winding number of a closed mesh decides.
+// normals, if the sample confirms it. Otherwise the winding number decides, if signs come from it, or the mesh is
+// closed and signed by normals.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
     const Side side = sideAt(toLocal(point));
     if (side.certain) return side.inside;
+    if (winding) return nearest.isOnSurface ? side.inside : winding->isInside(glm::dvec3(point));
     if (!mesh->mayEnclose(glm::dvec3(point))) return false;
     if (signedByNormals && confirms(nearest, side)) return heightOver(nearest) < 0;
     if (signedByWinding && !nearest.isOnSurface) {
-        const auto winding = windingNumber(*mesh, point);
-        if (winding && *winding >= 0) return *winding > 0;
+        const auto number = windingNumber(*mesh, point);
+        if (number && *number >= 0) return *number > 0;
     }
     return isBehind(nearest, side, point);
 }

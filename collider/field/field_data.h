@@ -18,6 +18,7 @@
 #include "collider/field/field_layout.h"
 #include "collider/field/mesh_tree.h"
 #include "sdf/base/finite.h"
+#include "sdf/bvh/winding_number.h"
 
 namespace bilayer::detail {
 
@@ -67,8 +68,9 @@ struct FieldData : FieldLayout {
     BlockEntries entries;                  ///< for closest-point searches in the band
     bool signedByNormals;                  ///< the signs come from the mesh's normals
     bool signedByWinding;  ///< the signs are those of winding numbers, which the mesh has everywhere: it is closed
-    float sampleError;     ///< max error of distances in the band relative to the mesh [m]; infinite: unknown
-    float error = 0;       ///< the same relative to the geometry that queries use: the mesh if there is one [m]
+    std::unique_ptr<const WindingNumber> winding;  ///< that the signs of an open mesh come from; null otherwise
+    float sampleError;  ///< max error of distances in the band relative to the mesh [m]; infinite: unknown
+    float error = 0;    ///< the same relative to the geometry that queries use: the mesh if there is one [m]
 
     /// Fraction bits of a fixed-point place. The remaining bits of the 32-bit word hold the voxel within its block.
     static constexpr int fractionBits = 29;

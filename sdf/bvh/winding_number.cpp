@@ -18,6 +18,8 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::size_t leafTriangles = 12;
+/// Errors that a cluster may have: at first, by how much less in each further try, and the rounding of the sum.
+constexpr double coarsest = 0.01, refinement = 16, finest = 1e-13;
 /// An estimate of an integer with a smaller error rounds to it: a half, less a margin for rounding.
 constexpr double surelyNearest = 0.49;
 
@@ -138,6 +140,27 @@ WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point, double 
         sum.error -= worst.estimate.error;
         refine(nodes_[worst.node], worst.node, point, sum, open);
     }
+}
+
+/// The sum over the triangles of a node. Each cluster that represents its triangles has an error below `maxError`.
+WindingNumber::Estimate WindingNumber::sumOf(std::uint32_t at, const glm::dvec3& point, double maxError) const {
+    const Node& node = nodes_[at];
+    const Estimate far = node.expansion(point);
+    if (far.error < maxError) return far;
+    if (node.right == 0) return {solidAngles(node, point), 0};
+    const Estimate left = sumOf(at + 1, point, maxError), right = sumOf(node.right, point, maxError);
+    return {left.value + right.value, left.error + right.error};
+}
+
+bool WindingNumber::isInside(const glm::dvec3& point) const noexcept {
+    for (double maxError = coarsest;; maxError = maxError > finest ? maxError / refinement : 0) {
+        const Estimate sum = sumOf(0, point, maxError);
+        if (maxError == 0 || sum.error < onlySide * std::abs(sum.value - 0.5)) return sum.value > 0.5;
+    }
+}
+
+std::size_t WindingNumber::memoryBytes() const noexcept {
+    return triangles_.size() * sizeof(Corners) + nodes_.size() * sizeof(Node);
 }
 
 // A first estimate bounds the true number's difference from 1/2. The second one then has an error below a half.

@@ -35,8 +35,8 @@ class WindingNumber {
     Estimate estimate(const glm::dvec3& point, double share) const;
     double operator()(const glm::dvec3& point) const { return estimate(point, 0.5).value; }
 
-    /// Returns whether the winding number at a point [m] is above one half. Refines less than estimate().
-    bool isInside(const glm::dvec3& point) const { return estimate(point, onlySide).value > 0.5; }
+    /// Returns whether the winding number at a point [m] is above one half. Allocates nothing.
+    bool isInside(const glm::dvec3& point) const noexcept;
 
     /// Returns the winding number at a point [m], rounded to an integer. Meant for closed meshes.
     int nearestInteger(const glm::dvec3& point) const;
@@ -45,6 +45,7 @@ class WindingNumber {
     bool meets(const glm::dvec3& from, const glm::dvec3& to) const;
 
     double area() const { return nodes_.front().total; }  ///< of all triangles [m^2]
+    std::size_t memoryBytes() const noexcept;
 
   private:
     friend class WindingInBall;
@@ -61,6 +62,7 @@ class WindingNumber {
     struct Item;
 
     double solidAngles(const Node& node, const glm::dvec3& point) const;
+    Estimate sumOf(std::uint32_t at, const glm::dvec3& point, double maxError) const;
     void refine(const Node& node, std::uint32_t at, const glm::dvec3& point, Estimate& sum,
                 std::vector<std::uint32_t>& open) const;
 

@@ -12,6 +12,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/drops.h"
 #include "tests/support/random.h"
+#include "tests/support/random_pose.h"
 #include "tests/support/support.h"
 
 namespace bilayer::drops_test {
@@ -38,7 +39,37 @@ Mesh stone(bool isOpen) {
     return mesh;
 }
 
+// A rotation about the vertical axis.
+glm::quat turned(float angle) {
+    return glm::angleAxis(angle, glm::vec3(0, 0, 1));
+}
+
+// A tetrahedron from which a long triangle sticks out.
+Mesh finned() {
+    const glm::vec3 a(0.4f, 0.3f, 0.4f), b(-0.4f, -0.3f, 0.4f), c(-0.4f, 0.3f, -0.4f), d(0.4f, -0.3f, -0.4f);
+    return {{a, b, c, d, {-0.4f, 0.04f, 0.4f}, {-0.4f, -0.04f, -0.4f}, {0.05f, 0.02f, 0}},
+            {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}, {4, 5, 6}}};
+}
+
 }  // namespace
+
+TEST_CASE("an open surface that sticks out of a body bears it") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Mesh mesh = finned();
+    const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 96), .interiorWidthVoxels = 6});
+    CHECK(field.sign() == "winding");
+    const auto collider = std::make_shared<Collider>(mesh, field);
+    for (const Ground& ground : grounds())
+        for (int i = 0; i < 8; ++i) {
+            const Drop result =
+                drop(collider, *ground.shape, {randomRotation(random), glm::vec2(random.point(0.3))}, 2);
+            CAPTURE(ground.name, i);
+            CHECK(result.gain < maxEnergyGain);
+            CHECK_FALSE(result.fell);
+        }
+}
 
 TEST_CASE("a body with small holes in its base gains no energy on any ground") {
     const unsigned seed = test::seed();
@@ -52,8 +83,8 @@ TEST_CASE("a body with small holes in its base gains no energy on any ground") {
         const auto collider = std::make_shared<Collider>(mesh, field);
         for (std::size_t ground = 0; ground < all.size(); ++ground)
             for (int i = 0; i < 4; ++i) {
-                const float turn = float(random(-3, 3));
-                const Drop result = drop(collider, *all[ground].shape, {turn, glm::vec2(random.point(0.3))}, 3);
+                const Drop result =
+                    drop(collider, *all[ground].shape, {turned(float(random(-3, 3))), glm::vec2(random.point(0.3))}, 3);
                 CAPTURE(isOpen, all[ground].name, i, result.sidewaysContacts);
                 CHECK(result.gain < maxEnergyGain);
                 CHECK_FALSE(result.fell);
@@ -75,7 +106,7 @@ TEST_CASE("dirty meshes that are usable as bodies gain no energy on any ground")
         const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 96), .interiorWidthVoxels = 6});
         const auto collider = std::make_shared<Collider>(mesh, field);
         for (const Ground& ground : all) {
-            const Drop result = drop(collider, *ground.shape, {0.3f, {0.1f, -0.05f}}, 2);
+            const Drop result = drop(collider, *ground.shape, {turned(0.3f), {0.1f, -0.05f}}, 2);
             CAPTURE(name, ground.name, result.sleeps);
             CHECK(result.gain < maxEnergyGain);
             CHECK_FALSE(result.fell);

@@ -285,7 +285,7 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
             openvdb::gridConstPtrCast<Points>(stored().grids().points)->tree().cbeginLeaf()->constAttributeArray("id"))
             .get(1);
     requireRefusal(changed({}, settingPoint("id", taken)), "number");
-    for (const char* name : {"N", "id", "sharp"})
+    for (const char* name : {"N", "id", "sharp", "back"})
         requireRefusal(changed({}, [=](Points& grid) { openvdb::points::dropAttribute(grid.tree(), name); }),
                        "contact_points");
 }

@@ -63,6 +63,22 @@ std::vector<MeetingSurfaces> meetingSurfaces(Random& random) {
             {"a crumpled surface", crumpled(random)}};
 }
 
+// Open meshes: with holes, with sheets that stick out, and sheets alone.
+std::vector<MeetingSurfaces> openMeshes(Random& random) {
+    const auto withoutSome = [&](Mesh mesh, double share) {
+        std::erase_if(mesh.triangles, [&](const glm::uvec3&) { return random(0, 1) < share; });
+        return mesh;
+    };
+    const auto triangle = [&] { return Mesh{{random.point(1), random.point(1), random.point(1)}, {{0, 1, 2}}}; };
+    const Mesh ball = shapes::sphere(0.7f, 3), box = shapes::box({0.5f, 0.4f, 0.3f}, 2);
+    return {{"a ball with holes", withoutSome(ball, 0.05)},
+            {"a torn ball", withoutSome(ball, 0.5)},
+            {"a box with a fin", shapes::join({box, triangle()})},
+            {"a box with many fins", shapes::join({box, triangle(), triangle(), triangle(), triangle()})},
+            {"a crumpled surface with holes", withoutSome(crumpled(random), 0.05)},
+            {"loose triangles", shapes::join({triangle(), triangle(), triangle()})}};
+}
+
 // Points whose side a query got wrong, of all whose winding number defines a side.
 struct WrongSides {
     std::size_t points = 0, closest = 0, inside = 0, sample = 0;
@@ -216,5 +232,35 @@ TEST_CASE("closest, inside and sample have the side of the winding number on pub
         requireNone(found);
         CHECK(found.closeClosest <= found.close / 10000);
     }
+}
+
+TEST_CASE("closest and inside have the side of the winding number near the surface of an open mesh") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int round = 0; round < 3; ++round)
+        for (const auto& [name, shape] : openMeshes(random)) {
+            const Mesh mesh = tilted(shape);
+            const float voxelSize = voxelSizeFor(mesh, float(random(12, 50)));
+            const LevelSet levelSet = build(mesh, {.voxelSize = voxelSize, .sign = Sign::winding});
+            const Field field(levelSet, mesh);
+            const Truth truth(mesh);
+            CAPTURE(round, name, voxelSize);
+            std::size_t wrong = 0, points = 0;
+            for (const glm::vec3& p : pointsAround(mesh, 0.1 * double(voxelSize), 3000, seed)) {
+                const double winding = windingNumber(mesh, glm::dvec3(p));
+                const ClosestPoint closest = field.closest(p);
+                REQUIRE(field.inside(p) == (closest.distance < 0));
+                const glm::dvec3 voxel = double(voxelSize) * glm::round(glm::dvec3(p) / double(voxelSize));
+                // in a hole, the side changes without a surface
+                const bool isVoxels = glm::distance(voxel, glm::dvec3(p)) < truth.distance(voxel);
+                if (isVoxels || truth.distance(glm::dvec3(p)) < samePlace * double(voxelSize)) continue;
+                if (std::abs(winding - 0.5) < 1e-6) continue;
+                ++points;
+                wrong += (closest.distance < 0) != (winding > 0.5);
+            }
+            CHECK(points > 1000);
+            CHECK(wrong == 0);
+        }
 }
 }  // namespace bilayer::sides_test

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "collider/contact/surface_points.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/vec2.hpp>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -70,6 +72,34 @@ const SurfacePoint& nearest(const SurfacePoints& points, const glm::dvec3& place
 }
 
 }  // namespace
+
+TEST_CASE("an open surface has points on both sides, and points on its border that face away from it") {
+    const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+    const SurfacePoints points(sheet, 0.1f, [](const glm::dvec3&) { return true; });
+    int up = 0, down = 0;
+    for (const SurfacePoint& p : points.points()) {
+        up += p.normal.z > 0.99f;
+        down += p.normal.z < -0.99f;
+        CHECK(p.isBack == !(p.normal.z > 0.99f));
+        if (std::abs(p.normal.z) > 0.99f) continue;
+        CHECK(p.isSharp);
+        const glm::vec2 fromCentre = glm::vec2(p.position) - 0.5f;
+        CHECK(std::max(std::abs(fromCentre.x), std::abs(fromCentre.y)) == Approx(0.5f));
+        CHECK(glm::dot(glm::normalize(fromCentre), glm::vec2(p.normal)) > 0.7f);
+    }
+    CHECK(up > 60);
+    CHECK(down > 60);
+    for (const glm::vec2 outward : {glm::vec2(1, 0), {0, 1}, {-1, 0}, {0, -1}})
+        for (float along = -0.45f; along < 0.5f; along += 0.1f) {
+            const glm::vec2 place = 0.5f + 0.5f * outward + along * glm::vec2(outward.y, outward.x);
+            const auto bears = [&](const SurfacePoint& p) {
+                return glm::dot(p.normal, glm::vec3(outward, 0)) > 0.7f &&
+                       glm::distance(p.position, glm::vec3(place, 0)) < 0.11f;
+            };
+            CAPTURE(outward.x, outward.y, along);
+            CHECK(std::any_of(points.points().begin(), points.points().end(), bears));
+        }
+}
 
 TEST_CASE("points lie on the mesh, cover it at the spacing, and are not many more than that takes") {
     const unsigned seed = test::seed();
@@ -201,9 +231,10 @@ TEST_CASE("normals point outward") {
         CAPTURE(name);
         const SurfacePoints points(mesh, spacing);
         for (std::size_t i = 0; i < points.points().size(); i += 7) {
-            const auto& [position, normal, isSharp] = points.points()[i];
-            REQUIRE(windingNumber(mesh, glm::dvec3(position + 1e-3f * normal)) < 0.5);
-            REQUIRE(windingNumber(mesh, glm::dvec3(position - 1e-3f * normal)) > 0.5);
+            const SurfacePoint& point = points.points()[i];
+            REQUIRE(windingNumber(mesh, glm::dvec3(point.position + 1e-3f * point.normal)) < 0.5);
+            REQUIRE(windingNumber(mesh, glm::dvec3(point.position - 1e-3f * point.normal)) > 0.5);
+            REQUIRE_FALSE(point.isBack);
         }
     }
 }

@@ -100,8 +100,7 @@ int contactsAside(btDispatcher& dispatcher, const btRigidBody& body) {
 // The body's transform where the mesh is turned and placed as asked, its lowest point at the drop height.
 btTransform start(const Collider& collider, const Pose& frame, const DropPlace& place) {
     const btTransform inMesh(bullet::detail::toBullet(frame.rotation), bullet::detail::toBullet(frame.position));
-    const btTransform mesh(btQuaternion(btVector3(0, 0, 1), place.rotation),
-                           btVector3(place.centre.x, place.centre.y, 0));
+    const btTransform mesh(bullet::detail::toBullet(place.rotation), btVector3(place.centre.x, place.centre.y, 0));
     btTransform body = mesh * inMesh.inverse();
     body.getOrigin().setZ(body.getOrigin().z() + height + dropHeight - lowest(collider.mesh(), mesh));
     return body;

@@ -2,6 +2,7 @@
 // Bodies that fall on five kinds of ground, and the energy that they gain. For tests and benchmarks.
 #pragma once
 
+#include <glm/gtc/quaternion.hpp>
 #include <glm/vec2.hpp>
 #include <memory>
 #include <vector>
@@ -27,8 +28,8 @@ std::vector<Ground> grounds();
 
 /// Where a body falls.
 struct DropPlace {
-    float rotation;    ///< initial rotation about z [rad]
-    glm::vec2 centre;  ///< of the mesh's own origin [m]
+    glm::quat rotation;  ///< of the mesh
+    glm::vec2 centre;    ///< of the mesh's own origin [m]
 };
 
 /// The result of a drop.
