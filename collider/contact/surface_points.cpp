@@ -4,12 +4,15 @@
 // surfaces have candidates on both sides, and on their borders, where the normals point away from the surface.
 #include "collider/contact/surface_points.h"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtx/norm.hpp>
+#include <iterator>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
@@ -72,20 +75,12 @@ class Candidates {
     // Skips places where all triangles are degenerate: they have no outside.
     void add(const glm::dvec3& position, const glm::dvec3& direction, double convexity) {
         const double length = glm::length(direction);
-        if (!(length > 0)) return;
-        const glm::dvec3 normal = direction / length;
-        result.push_back({position, normal, convexity, false});
-        if (isTwoSided(position, normal)) result.push_back({position, -normal, -convexity, true});
+        if (length > 0) result.push_back({position, direction / length, convexity, false});
     }
 
     void addOnBorder(const glm::dvec3& position, const glm::dvec3& inward) {
         const double length = glm::length(inward);
         if (length > 0) result.push_back({position, -inward / length, borderConvexity, true});
-    }
-
-    // Whether the space behind a place is outside, too.
-    bool isTwoSided(const glm::dvec3& position, const glm::dvec3& normal) const {
-        return isOutside_ && isOutside_(position - thinnest_ * normal);
     }
 
     void addVertices() {
@@ -145,9 +140,9 @@ class Candidates {
 
     // Whether an edge is the border of an open surface.
     bool isBorder(std::vector<Edge>::const_iterator first, std::vector<Edge>::const_iterator last) const {
-        if (last - first != 1) return false;
+        if (!isOutside_ || last - first != 1) return false;
         const glm::dvec3 middle = 0.5 * (at(first->low) + at(first->high));
-        return isTwoSided(middle + thinnest_ * inward(*first), normals_[first->triangle]);
+        return isOutside_(middle + thinnest_ * (inward(*first) - normals_[first->triangle]));
     }
 
     // The conormal of an edge in its triangle.
@@ -231,18 +226,44 @@ class Grid {
 };
 
 // Takes candidates in order of decreasing convexity, except those close to a taken one.
-std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing) {
+std::vector<Candidate> thin(std::vector<Candidate> candidates, double spacing, Grid& grid) {
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.convexity > b.convexity; });
-    Grid grid(minGap * spacing, candidates.size());
-    std::vector<SurfacePoint> points;
+    std::vector<Candidate> taken;
     for (const Candidate& candidate : candidates) {
         const double gap = candidate.convexity >= corner ? minCornerGap : minGap;
         if (grid.hasNeighbour(candidate, gap * spacing, minProtrusion * spacing)) continue;
         grid.insert(candidate);
-        points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal),
-                          candidate.convexity >= sharpConvexity, candidate.isBack});
+        taken.push_back(candidate);
     }
+    return taken;
+}
+
+// The other side of candidates that have the outside behind them.
+std::vector<Candidate> backsOf(const std::vector<Candidate>& candidates, double spacing,
+                               const SurfacePoints::IsOutside& isOutside) {
+    std::vector<char> isTwoSided(candidates.size());
+    tbb::parallel_for(std::size_t(0), candidates.size(), [&](std::size_t i) {
+        const Candidate& front = candidates[i];
+        isTwoSided[i] = !front.isBack && isOutside(front.position - thinnestWall * spacing * front.normal);
+    });
+    std::vector<Candidate> backs;
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+        if (const auto& [position, normal, convexity, isBack] = candidates[i]; isTwoSided[i])
+            backs.push_back({position, -normal, -convexity, true});
+    return backs;
+}
+
+std::vector<Candidate> pointsOf(const Mesh& mesh, double spacing, const SurfacePoints::IsOutside& isOutside) {
+    const std::vector<Candidate> all = Candidates(mesh, spacing, isOutside).result;
+    Grid grid(minGap * spacing, 2 * all.size());
+    std::vector<Candidate> points = thin(all, spacing, grid);
+    if (!isOutside) return points;
+    std::vector<Candidate> fronts = points;  // and the dents, which are sharp from behind
+    std::copy_if(all.begin(), all.end(), std::back_inserter(fronts),
+                 [](const Candidate& candidate) { return candidate.convexity <= -sharpConvexity; });
+    const std::vector<Candidate> backs = thin(backsOf(fronts, spacing, isOutside), spacing, grid);
+    points.insert(points.end(), backs.begin(), backs.end());
     return points;
 }
 
@@ -290,7 +311,9 @@ SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing, const IsOutside& i
         throw std::invalid_argument("the spacing must be positive and finite");
     validate(mesh);
     const Mesh welded = weld(mesh);
-    points_ = thin(Candidates(welded, spacing, isOutside).result, spacing);
+    for (const Candidate& point : pointsOf(welded, spacing, isOutside))
+        points_.push_back(
+            {glm::vec3(point.position), glm::vec3(point.normal), point.convexity >= sharpConvexity, point.isBack});
     if (points_.empty()) throw std::invalid_argument("all triangles of the mesh are degenerate");
     order(points_, 0, std::uint32_t(points_.size()));
     addNode(points_, nodes_, 0, std::uint32_t(points_.size()));

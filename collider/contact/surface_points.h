@@ -38,7 +38,7 @@ class SurfacePoints {
   public:
     SurfacePoints() = default;
 
-    /// Whether a place is outside of a body [m].
+    /// Whether a place is outside of a body [m]. Called from several threads at a time.
     using IsOutside = std::function<bool(const glm::dvec3& place)>;
 
     /// Throws std::invalid_argument for an invalid mesh.
