@@ -88,11 +88,11 @@ class Field {
     /// - The sign is the field's wherever that is certain: farther than a voxel's diagonal from the surface, and mostly
     ///   nearer. inside() and the sign of sample() agree with it there; but for sample() in a hole wider than a voxel,
     ///   where the side changes between two voxels without a surface.
-    /// - Elsewhere, in a mesh signed by winding numbers, and in a closed one signed by normals, it is that of the
-    /// mesh's
-    ///   winding number. If signed by normals, the normal at the closest feature decides where the sample agrees with
-    ///   it, and within a tenth of a voxel of the surface. That errs only where the surface comes within a voxel of
-    ///   itself.
+    /// - Elsewhere, in a closed mesh signed by normals or winding numbers, it is that of the mesh's winding number. In
+    ///   one signed by normals, the normal at the closest feature decides where the sample agrees with it, and within a
+    ///   tenth of a voxel of the surface. That errs only where the surface comes within a voxel of itself.
+    /// - Elsewhere, in an open mesh signed by winding numbers, it is that of the winding number. Over a face with no
+    ///   other surface within a voxel, the normal decides, which is faster.
     /// - Elsewhere, in other meshes, the normal decides if the field confirms that the wall separates inside from
     ///   outside; otherwise the sample.
     /// - Any one of the features that are equally close within the tolerance is returned. At an edge or vertex itself,

@@ -29,7 +29,7 @@ namespace {
 
 using openvdb::Vec3s;
 
-constexpr std::int32_t format = 1;        // increases when an older reader would misread the data
+constexpr std::int32_t format = 2;        // increases when an older reader would misread the data
 constexpr float massError = 1e-3f;        // of moments of inertia, relative to the largest
 constexpr float boundsError = 1e-5f;      // of points outside the bounds, relative to their size
 constexpr double maxFieldBeyondBand = 4;  // max extent of a field beyond its mesh and band [voxels]

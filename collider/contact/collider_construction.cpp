@@ -83,7 +83,8 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
     auto mass = meshOrFieldMass(oriented, levelSet);
     Filled filled = filledMesh(outerSurface(levelSet, std::move(oriented)), levelSet);
     const auto mesh = std::make_shared<const Mesh>(std::move(filled.mesh));
-    return {.points = pointsOf(*mesh, levelSet, options.pointSpacingVoxels * levelSet.voxelSize()),
+    const LevelSet& signs = filled.levelSet ? *filled.levelSet : levelSet;
+    return {.points = pointsOf(*mesh, signs, options.pointSpacingVoxels * levelSet.voxelSize()),
             .bounds = bounds(*mesh),
             .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
             .mass = std::move(mass),

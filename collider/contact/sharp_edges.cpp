@@ -40,7 +40,9 @@ constexpr float level = 0.09f;
 constexpr float minBend = 0.0872f;
 // Distance from an edge at which its faces are sampled [voxels].
 constexpr float conormalOffset = 1.5f;
-// Min length of the way along a face from an edge to where it is sampled [voxels].
+// The ends of an edge have normals with a larger cosine: those of two borders of a strip are opposite.
+constexpr float oppositeNormals = -0.99f;
+// Min distance from an edge at which its faces are found [voxels].
 constexpr float minConormal = 0.1f;
 // Tolerance for the ends of an edge's segments, relative to their length.
 constexpr float endTolerance = 0.02f;
@@ -70,7 +72,8 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
             // the height of the segment above an arc with these normals: a quarter of its ends' heights over each
             // other
             const float above = 0.125f * (glm::dot(offset, point.normal) - glm::dot(offset, there.normal));
-            if (cosine < maxNormalCosine && above <= maxAbove * field.voxelSize())
+            const bool isOneEdge = glm::dot(point.normal, there.normal) > oppositeNormals;
+            if (isOneEdge && cosine < maxNormalCosine && above <= maxAbove * field.voxelSize())
                 candidates.push_back({other, direction, distance});
         });
     std::sort(candidates.begin(), candidates.end(), [](const Neighbour& a, const Neighbour& b) {

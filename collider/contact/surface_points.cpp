@@ -12,7 +12,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtx/norm.hpp>
-#include <iterator>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
@@ -20,16 +19,16 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double latticePitch = 0.75;    // of candidates on edges and faces [spacings]
-constexpr double minGap = 0.7;           // min distance of points with about the same normal [spacings]
-constexpr double minLikeCosine = 0.7;    // min cosine between such normals: a cube's edge and its faces have 0.71
-constexpr double minProtrusion = 0.035;  // max height of a dropped candidate over such a point [spacings]
-constexpr double minCornerGap = 0.1;     // between convex vertices [spacings]: a fraction of a voxel
-constexpr double corner = 0.5;           // min convexity of a vertex: a cube's has 0.58
-constexpr double sharpConvexity = 0.15;  // min convexity of an edge: a cube's have 0.35
-constexpr double borderConvexity = 0.5;  // of the border of an open surface: as of the edge between two opposite faces
-constexpr double thinnestWall = 0.02;    // what is thinner is an open surface [spacings]
-constexpr std::uint32_t leafPoints = 8;  // max count of points in a leaf of the tree
+constexpr double latticePitch = 0.75;      // of candidates on edges and faces [spacings]
+constexpr double minGap = 0.7;             // min distance of points with about the same normal [spacings]
+constexpr double minLikeCosine = 0.7;      // min cosine between such normals: a cube's edge and its faces have 0.71
+constexpr double minProtrusion = 0.035;    // max height of a dropped candidate over such a point [spacings]
+constexpr double minCornerGap = 0.1;       // between convex vertices [spacings]: a fraction of a voxel
+constexpr double corner = 0.5;             // min convexity of a vertex: a cube's has 0.58
+constexpr double sharpConvexity = 0.15;    // min convexity of an edge: a cube's have 0.35
+constexpr double borderConvexity = 0.45;   // of the border of an open surface: a sharp edge, and no corner
+constexpr double thinnestWall = 0.02;      // what is thinner is an open surface [spacings]
+constexpr std::uint32_t leafPoints = 8;    // max count of points in a leaf of the tree
 constexpr float sphereGrowth = 1.000001f;  // growth factor of spheres, against rounding in single precision
 
 struct Candidate {
@@ -239,19 +238,24 @@ std::vector<Candidate> thin(std::vector<Candidate> candidates, double spacing, G
     return taken;
 }
 
-// The other side of candidates that have the outside behind them.
-std::vector<Candidate> backsOf(const std::vector<Candidate>& candidates, double spacing,
-                               const SurfacePoints::IsOutside& isOutside) {
-    std::vector<char> isTwoSided(candidates.size());
-    tbb::parallel_for(std::size_t(0), candidates.size(), [&](std::size_t i) {
-        const Candidate& front = candidates[i];
-        isTwoSided[i] = !front.isBack && isOutside(front.position - thinnestWall * spacing * front.normal);
-    });
+// The candidates as seen from behind, but for those on borders.
+std::vector<Candidate> backsOf(const std::vector<Candidate>& candidates) {
     std::vector<Candidate> backs;
-    for (std::size_t i = 0; i < candidates.size(); ++i)
-        if (const auto& [position, normal, convexity, isBack] = candidates[i]; isTwoSided[i])
-            backs.push_back({position, -normal, -convexity, true});
+    for (const auto& [position, normal, convexity, isBack] : candidates)
+        if (!isBack) backs.push_back({position, -normal, -convexity, true});
     return backs;
+}
+
+// Removes the backs that do not face the outside.
+void keepOutside(std::vector<Candidate>& backs, double spacing, const SurfacePoints::IsOutside& isOutside) {
+    std::vector<char> facesOutside(backs.size());
+    tbb::parallel_for(std::size_t(0), backs.size(), [&](std::size_t i) {
+        facesOutside[i] = isOutside(backs[i].position + thinnestWall * spacing * backs[i].normal);
+    });
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < backs.size(); ++i)
+        if (facesOutside[i]) backs[kept++] = backs[i];
+    backs.resize(kept);
 }
 
 std::vector<Candidate> pointsOf(const Mesh& mesh, double spacing, const SurfacePoints::IsOutside& isOutside) {
@@ -259,10 +263,8 @@ std::vector<Candidate> pointsOf(const Mesh& mesh, double spacing, const SurfaceP
     Grid grid(minGap * spacing, 2 * all.size());
     std::vector<Candidate> points = thin(all, spacing, grid);
     if (!isOutside) return points;
-    std::vector<Candidate> fronts = points;  // and the dents, which are sharp from behind
-    std::copy_if(all.begin(), all.end(), std::back_inserter(fronts),
-                 [](const Candidate& candidate) { return candidate.convexity <= -sharpConvexity; });
-    const std::vector<Candidate> backs = thin(backsOf(fronts, spacing, isOutside), spacing, grid);
+    std::vector<Candidate> backs = thin(backsOf(all), spacing, grid);
+    keepOutside(backs, spacing, isOutside);
     points.insert(points.end(), backs.begin(), backs.end());
     return points;
 }

@@ -15,7 +15,7 @@ namespace bilayer::detail {
 struct SurfacePoint {
     glm::vec3 position;  ///< [m]
     glm::vec3 normal;    ///< outward, of unit length
-    bool isSharp;        ///< on a convex edge or vertex, where faces with different normals meet
+    bool isSharp;        ///< on a convex edge or vertex, where faces with different normals meet; or on a border
     /// On the back or the border of an open surface. Triangles of another body have two sides, too: only the front
     /// tells which side of them the surface comes from, and these points do not touch them.
     bool isBack = false;

@@ -121,14 +121,28 @@ FieldData::Side FieldData::sideAt(const glm::dvec3& local) const {
     return {distance < 0, index < 0 && std::abs(distance) > error, distance};
 }
 
+// The samples on both sides of a place of the mesh.
+FieldData::Probes FieldData::probesAt(const glm::dvec3& place, const glm::dvec3& normal) const {
+    const glm::dvec3 step = double(probeOffset * voxelSize) * glm::normalize(normal);
+    const auto distanceAt = [&](const glm::dvec3& at) { return sample((at - origin) * perMetre).distance; };
+    return {distanceAt(place + step), distanceAt(place - step)};
+}
+
 // Whether the field changes sign at a place of the mesh. It does not at walls within the solid, nor at free-standing
 // walls. Next to an edge, one of the two samples may be close to another wall.
 bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const {
-    const glm::dvec3 step = double(probeOffset * voxelSize) * glm::normalize(normal);
-    const auto distanceAt = [&](const glm::dvec3& at) { return sample((at - origin) * perMetre).distance; };
-    const float outer = distanceAt(place + step), inner = distanceAt(place - step);
+    const auto [outer, inner] = probesAt(place, normal);
     return outer > -edgeError * voxelSize && inner < edgeError * voxelSize &&
            outer - inner > probeOffset * voxelSize / 2;
+}
+
+// Whether a point is over a face of a wall that stands alone: on either side, the field is almost as far from it as it
+// can be.
+bool FieldData::isNextToWall(const NearestFeature& nearest, const glm::vec3& point) const {
+    if (nearest.feature != Feature::face) return false;
+    const auto [outer, inner] = probesAt(glm::dvec3(point) + nearest.offset, nearest.normal);
+    const float clear = (probeOffset - edgeError) * voxelSize;
+    return outer > clear && inner < -clear;
 }
 
 // Whether a normal defines the side of a point, and the sample does not contradict it: it has the same sign, or both
@@ -140,13 +154,14 @@ bool FieldData::confirms(const NearestFeature& nearest, const Side& side) const 
     return hasSide && ((height < 0) == side.inside || (distance < close && double(std::abs(side.distance)) < close));
 }
 
-// The field decides where it is certain, so that all queries agree. Otherwise the normal decides for meshes signed by
-// normals, if the sample confirms it. Otherwise the winding number decides, if signs come from it, or the mesh is
-// closed and signed by normals.
+// The field decides where it is certain, so that all queries agree. Otherwise, in an open mesh signed by winding
+// numbers, the normal decides next to a wall alone; else the winding number. In other meshes signed by normals, the
+// normal decides, if the sample confirms it; else the winding number of a closed mesh.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
     const Side side = sideAt(toLocal(point));
     if (side.certain) return side.inside;
-    if (winding) return nearest.isOnSurface ? side.inside : winding->isInside(glm::dvec3(point));
+    if (winding && !nearest.isOnSurface)
+        return isNextToWall(nearest, point) ? heightOver(nearest) < 0 : winding->isInside(glm::dvec3(point));
     if (!mesh->mayEnclose(glm::dvec3(point))) return false;
     if (signedByNormals && confirms(nearest, side)) return heightOver(nearest) < 0;
     if (signedByWinding && !nearest.isOnSurface) {

@@ -67,8 +67,8 @@ struct FieldData : FieldLayout {
     std::unique_ptr<const MeshTree> mesh;  ///< null: the field has no mesh
     BlockEntries entries;                  ///< for closest-point searches in the band
     bool signedByNormals;                  ///< the signs come from the mesh's normals
-    bool signedByWinding;  ///< the signs are those of winding numbers, which the mesh has everywhere: it is closed
-    std::unique_ptr<const WindingNumber> winding;  ///< that the signs of an open mesh come from; null otherwise
+    bool signedByWinding;  ///< the mesh is closed, and the signs are those of its winding numbers or normals
+    std::unique_ptr<const WindingNumber> winding;  ///< gave an open mesh its signs; null for others
     float sampleError;  ///< max error of distances in the band relative to the mesh [m]; infinite: unknown
     float error = 0;    ///< the same relative to the geometry that queries use: the mesh if there is one [m]
 
@@ -112,7 +112,12 @@ struct FieldData : FieldLayout {
     std::ptrdiff_t nearestVoxel(const glm::dvec3& local) const;
     void fetchSide(const glm::dvec3& local) const;
     Side sideAt(const glm::dvec3& local) const;
+    struct Probes {
+        float outer, inner;  ///< samples [m]
+    };
+    Probes probesAt(const glm::dvec3& place, const glm::dvec3& normal) const;
     bool divides(const glm::dvec3& place, const glm::dvec3& normal) const;
+    bool isNextToWall(const NearestFeature& nearest, const glm::vec3& point) const;
     bool confirms(const NearestFeature& nearest, const Side& side) const;
     bool isBehind(const NearestFeature& nearest, const Side& side, const glm::vec3& point) const;
     bool isInside(const NearestFeature& nearest, const glm::vec3& point) const;

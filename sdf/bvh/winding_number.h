@@ -35,7 +35,7 @@ class WindingNumber {
     Estimate estimate(const glm::dvec3& point, double share) const;
     double operator()(const glm::dvec3& point) const { return estimate(point, 0.5).value; }
 
-    /// Returns whether the winding number at a point [m] is above one half. Allocates nothing.
+    /// Returns whether the winding number at a point [m] is above one half. Right as estimate() is. Allocates nothing.
     bool isInside(const glm::dvec3& point) const noexcept;
 
     /// Returns the winding number at a point [m], rounded to an integer. Meant for closed meshes.

@@ -101,6 +101,35 @@ TEST_CASE("an open surface has points on both sides, and points on its border th
         }
 }
 
+TEST_CASE("the back of a shell is covered as its front, whichever of them is outside") {
+    for (const float radius : {0.15f, 0.2f, 0.3f, 0.5f})
+        for (const bool isFlipped : {false, true}) {
+            const Mesh ball = shapes::sphere(radius, 4);
+            const SurfacePoints points(isFlipped ? shapes::flipped(ball) : ball, 0.1f,
+                                       [](const glm::dvec3&) { return true; });
+            CAPTURE(radius, isFlipped);
+            for (const bool isBack : {false, true})
+                for (const glm::vec3& vertex : ball.points) {
+                    const glm::vec3 normal = glm::normalize(vertex) * (isBack == isFlipped ? 1.f : -1.f);
+                    const auto covers = [&](const SurfacePoint& p) {
+                        return p.isBack == isBack && glm::distance(p.position, vertex) < 0.1f &&
+                               glm::dot(p.normal, normal) > 0.5f && glm::dot(vertex - p.position, normal) < 0.005f;
+                    };
+                    REQUIRE(std::any_of(points.points().begin(), points.points().end(), covers));
+                }
+        }
+}
+
+TEST_CASE("a thin closed plate has no backs") {
+    const Mesh plate = shapes::box({0.5f, 0.5f, 0.00015f});
+    const SurfacePoints points(plate, 0.02f, [](const glm::dvec3& place) { return std::abs(place.z) > 0.00015; });
+    for (const bool isUp : {false, true})
+        CHECK(std::any_of(points.points().begin(), points.points().end(), [&](const SurfacePoint& p) {
+            return !p.isBack && (isUp ? p.normal.z > 0.9f : p.normal.z < -0.9f);
+        }));
+    CHECK(std::none_of(points.points().begin(), points.points().end(), [](const SurfacePoint& p) { return p.isBack; }));
+}
+
 TEST_CASE("points lie on the mesh, cover it at the spacing, and are not many more than that takes") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
