@@ -25,6 +25,9 @@ class EdgePlanes {
         }
     }
 
+    /// The unit vector across edge i that leads away from the face.
+    const glm::dvec3& outward(std::size_t i) const { return outward_[i]; }
+
     /// Whether a box is beyond one of the planes by more than the slack.
     bool isBeyond(const glm::dvec3& lower, const glm::dvec3& upper) const {
         for (std::size_t i = 0; i < 3; ++i)
@@ -74,6 +77,34 @@ class TriangleOverlap {
     const double at_, slack_;  // both doubled
     const EdgePlanes& edges_;
 };
+
+/// Whether a neighbour leads away from what it shares with a face, so that all else of it that comes near the face is
+/// within `negligible` of a shared vertex. Seen along the normal, a point of it that is no farther than the slack beyond
+/// the face's edges is at most slack / minSlope from the vertex. True for most neighbours.
+/// @param a, b  vertices of the face and of the neighbour, whose corners are given
+bool leadsAway(const glm::uvec3& a, const glm::uvec3& b, const TriangleCorners& corners, const EdgePlanes& edges) {
+    constexpr double minSlope = 1.05 / negligible;
+    int count = 0, sumInA = 0, sumInB = 0;
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k)
+            if (a[i] == b[k]) ++count, sumInA += i, sumInB += k;
+    const auto leads = [&](const glm::dvec3& outward, double slope, int from, int to) {
+        const glm::dvec3 along = corners[std::size_t(to)] - corners[std::size_t(from)];
+        return glm::dot(outward, along) >= slope * glm::length(along);
+    };
+    if (b.x == b.y || b.y == b.z || b.z == b.x) return false;
+    if (count == 2) {
+        const int third = 3 - sumInB;
+        const glm::dvec3& outward = edges.outward(std::size_t(4 - sumInA) % 3);  // of the edge opposite 3 - sumInA
+        return leads(outward, minSlope, (third + 1) % 3, third) && leads(outward, minSlope, (third + 2) % 3, third);
+    }
+    if (count != 1) return false;
+    const glm::dvec3 &next = edges.outward(std::size_t(sumInA)), &last = edges.outward(std::size_t(sumInA + 2) % 3);
+    const auto bothLead = [&](const glm::dvec3& outward, double slope) {
+        return leads(outward, slope, sumInB, (sumInB + 1) % 3) && leads(outward, slope, sumInB, (sumInB + 2) % 3);
+    };
+    return bothLead(next, minSlope) || bothLead(last, minSlope) || bothLead(next + last, 2 * minSlope);
+}
 
 /// A point on a face's plane, and the height from which it was projected.
 struct ProjectedPoint {
@@ -160,6 +191,7 @@ std::vector<Segment> TriangleContacts::within(unsigned triangle) const {
     tree_.descend(TriangleOverlap(tree_.boxOf(triangle), face, edges, slack_), [&](unsigned other) {
         if (other == triangle) return;
         const TriangleCorners corners = cornersOf(mesh_, other);
+        if (leadsAway(topology_.triangles[triangle], topology_.triangles[other], corners, edges)) return;
         const double height[] = {face.height(corners[0]), face.height(corners[1]), face.height(corners[2])};
         const auto [low, high] = std::minmax({height[0], height[1], height[2]});
         if (low <= 2 * slack_ && high >= -2 * slack_ && !edges.isBeyond(corners))

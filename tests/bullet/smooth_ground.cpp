@@ -155,6 +155,9 @@ TEST_CASE("A ball that slides over flat triangles until it rolls loses what fric
         const float speed = float(random(1.5, 2.5)), y = float(random(-1, 1));
         CAPTURE(seed, steps, speed, y);
         Slider slider(*ground, ball, {-5, y, 0.25f}, {speed, 0, 0});
+        // On a vertex. In the middle of a facet, friction would first have to tip the ball over the facet's front edge,
+        // which takes 1.2 % of its speed.
+        slider.body->getWorldTransform().setRotation(btQuaternion({0, 1, 0}, 0.0668f));
         slider.body->setFriction(1);
         slider.world.dynamics.getCollisionObjectArray()[0]->setFriction(0.4f);
         const WorldExtensions extensions(slider.world.dynamics);
