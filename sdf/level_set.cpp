@@ -64,12 +64,13 @@ std::string requireName(const openvdb::GridBase& grid, const char* entry, const 
 }
 
 // A field from another program may state any error, or none.
-void requireErrorBound(const openvdb::GridBase& grid, const std::string& method, float errorBound) {
+void requireErrorBound(const openvdb::GridBase& grid, const std::string& method, float errorBound, float bandWidth) {
     if (!grid[metadata::errorBound]) return;
     const bool hasBound = method == nameOf(Method::exact) || method == nameOf(Method::pseudonormal);
     const float least = hasBound ? (1 - widthRounding) * exactError : 0, h = float(grid.voxelSize()[0]);
-    requireEntry(errorBound >= least * h && (std::isfinite(errorBound) || !hasBound), grid, metadata::errorBound,
-                 errorBound, hasBound ? "finite and at least the error of its method" : "0 or above");
+    requireEntry(errorBound >= least * h && (errorBound <= std::max(h, bandWidth) || !hasBound), grid,
+                 metadata::errorBound, errorBound,
+                 hasBound ? "at least the error of its method, and at most the width of the band" : "0 or above");
 }
 
 // Methods with signs of their own have no others.
@@ -125,7 +126,7 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     meta<std::string>(grid, metadata::version, "");
     method_ = requireName(grid, metadata::method, methods);
     errorBound_ = meta<float>(grid, metadata::errorBound, std::numeric_limits<float>::quiet_NaN());
-    requireErrorBound(grid, method_, errorBound_);
+    requireErrorBound(grid, method_, errorBound_, std::max(exteriorWidth_, interiorWidth_));
     sign_ = requireName(grid, metadata::sign, signs);
     requireSignOfMethod(grid, method_, sign_);
     signReason_ = meta<std::string>(grid, metadata::signReason, "");

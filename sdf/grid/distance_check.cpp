@@ -26,6 +26,7 @@ class DistanceCheck {
   public:
     explicit DistanceCheck(const LevelSet& levelSet)
         : grid_(*levelSet.grids().distance),
+          exterior_(levelSet.exteriorWidth()),
           interior_(levelSet.interiorWidth()),
           isOurs_(grid_[metadata::interiorWidth] || grid_[metadata::version]),
           isBand_(isOurs_ && grid_[metadata::errorBound]) {}
@@ -52,6 +53,9 @@ class DistanceCheck {
 
     void check(float distance, bool active) const {
         if (!std::isfinite(distance)) refuse("holds a distance that is no finite number");
+        if (active && isBand_ && distance > (1 + halfRounding) * exterior_)
+            refuse(fmt::format("has an active voxel {:g} outside, but its background is {:g}: it must be at least that",
+                               distance, exterior_));
         if (!isOurs_ || distance >= 0) return;
         const bool deeper = -distance > (1 + halfRounding) * interior_;
         if (!active && (deeper || -distance < (1 - halfRounding) * interior_))
@@ -80,9 +84,9 @@ class DistanceCheck {
     }
 
     const openvdb::FloatGrid& grid_;
-    float interior_;  // the width of the band inside [m]
-    bool isOurs_;     // inactive voxels inside hold the width; without an entry, it is that outside
-    bool isBand_;     // as build() made it, unlike an extended field: active voxels are within the band
+    float exterior_, interior_;  // the widths of the band [m]
+    bool isOurs_;                // inactive voxels inside hold the width; without an entry, it is that outside
+    bool isBand_;                // as build() made it, unlike an extended field: active voxels are within the band
 };
 
 }  // namespace

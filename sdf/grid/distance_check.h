@@ -11,6 +11,7 @@ namespace bilayer::detail {
 /// - a distance is not finite, which rounding, searches and solvers would propagate;
 /// - a tile is active, which solvers would fill with voxels;
 /// - the stored interior width is not that of inactive voxels inside, or less than that of an active one;
+/// - an active voxel outside is beyond the background;
 /// - a voxel is too far from the origin of the grid.
 void requireValidDistances(const LevelSet& levelSet);
 

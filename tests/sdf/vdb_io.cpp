@@ -241,6 +241,33 @@ TEST_CASE("a file with a distance that is no number is refused") {
     }
 }
 
+TEST_CASE("A file is refused whose error bound or active voxels are beyond the band") {
+    const auto path = test::scratch("beyond.vdb");
+    const auto written = [&](auto change) {
+        const auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(torus().grids().distance)->deepCopy();
+        change(*grid);
+        openvdb::io::File(path.string()).write({grid});
+        return path;
+    };
+    const float voxel = torus().voxelSize(), width = torus().exteriorWidth();
+    const auto withBound = [&](float bound) {
+        return written([&](auto& grid) { grid.insertMeta(metadata::errorBound, openvdb::FloatMetadata(bound)); });
+    };
+    for (const float bound : {1e-4f * voxel, voxel, width}) CHECK(readVdb(withBound(bound)).errorBound() == bound);
+    for (const float bound : {-1.f, 0.f, 0.9e-4f * voxel, 1.01f * width, 1e3f, 3.5e37f,
+                              std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+        CAPTURE(bound);
+        CHECK_THROWS_WITH(readVdb(withBound(bound)), Catch::Contains("bilayer:error_bound"));
+    }
+    for (const float distance : {1.01f * width, 1e3f, 3.5e37f}) {
+        CAPTURE(distance);
+        const auto change = [&](auto& grid) {
+            grid.tree().setValue(grid.evalActiveVoxelBoundingBox().min(), distance);
+        };
+        CHECK_THROWS_WITH(readVdb(written(change)), Catch::Contains("outside, but its background is"));
+    }
+}
+
 TEST_CASE("the clamped values of another program's dense array are not in the band") {
     openvdb::initialize();
     const float width = 3 * 0.1f;
