@@ -33,6 +33,8 @@ constexpr float maxEnergyRatio = 8;
 constexpr float groundRestSpeed = 2;
 // Approach velocities below this fraction of the speed along the ground are rounding.
 constexpr float minSlope = 1e-3f;
+// Slope beyond the steepest smooth edge.
+constexpr float maxSmoothSlope = 0.364f;  // tan(20 degrees)
 // Maximum change of a body's kinetic energy in a step, relative.
 constexpr float maxChange = 0.2f;
 
@@ -51,11 +53,22 @@ bool isGround(const btCollisionObject& object) {
     return velocity.linear.isZero() && velocity.angular.isZero();
 }
 
-/// The maximum angle between faces at the smooth edges in the bounding box of a body [rad].
+/// How far a body flies beyond a smooth edge before it lands, at most its own size [m].
+btVector3 flightOf(const btRigidBody& body, float size) {
+    const float speed = body.getLinearVelocity().length(), gravity = body.getGravity().length();
+    const float flown = 2 * speed * speed * maxSmoothSlope / gravity;
+    return speed > 0 ? std::min(flown, size) / speed * body.getLinearVelocity() : btVector3(0, 0, 0);
+}
+
+/// The maximum angle between faces at the smooth edges in the bounding box of a body, and behind it as far as it flies
+/// beyond an edge [rad].
 /// @param at  pose of the shape with the edges
 float edgeAngleUnder(const btRigidBody& body, const btCollisionShape& shape, const btTransform& at) {
     btVector3 lower, upper;
     body.getCollisionShape()->getAabb(at.inverse() * body.getWorldTransform(), lower, upper);
+    const btVector3 behind = at.getBasis().transpose() * -flightOf(body, (upper - lower).length());
+    lower.setMin(lower + behind);
+    upper.setMax(upper + behind);
     std::vector<Triangle> triangles;
     const auto add = [&](const Triangle& triangle, std::uint64_t) {
         const btVector3 corners[] = {toBullet(triangle[0]), toBullet(triangle[1]), toBullet(triangle[2])};
@@ -96,9 +109,17 @@ float edgeAngleOf(const btRigidBody& body, const btVector3& place) {
 
 }  // namespace
 
+/// Twice the energy per mass of the fall of a body that has tipped over an edge. Its centre accelerates from the edge
+/// as it moves on, until the body has turned by the angle; for a body whose radius of gyration about the edge is `arm`.
+float FacetImpact::tipping(float angle) const {
+    const float slope = std::tan(angle), beyondEdge = std::cbrt(6 * arm * arm * slope * speed * speed / gravity);
+    return gravity > 0 ? 2 * gravity * std::min(beyondEdge, arm) * slope : 0;
+}
+
 float FacetImpact::loss(float angle) const {
-    const float caused = speed * std::tan(angle) * std::sqrt(maxEnergyRatio * mobility), ratio = caused / before;
-    return -0.5f * impulse * (before + after) * std::min(ratio * ratio, 1.f);
+    const float deflected = speed * std::tan(angle);
+    const float caused = maxEnergyRatio * mobility * deflected * deflected + (mobility - 1) * tipping(angle);
+    return -0.5f * impulse * (before + after) * std::min(caused / (before * before), 1.f);
 }
 
 float FacetFriction::loss(float angle) const {
@@ -141,9 +162,13 @@ float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& g
         const btVector3 normal = (bodyIsFirst ? 1.f : -1.f) * point.m_normalWorldOnB;
         const auto along = [&](const btVector3& v) { return v - normal.dot(v) * normal; };
         const btVector3 pointBefore = before->at(place), pointAfter = after.at(place);
-        const FacetImpact impact{point.m_appliedImpulse, normal.dot(pointBefore), normal.dot(pointAfter),
+        const FacetImpact impact{point.m_appliedImpulse,
+                                 normal.dot(pointBefore),
+                                 normal.dot(pointAfter),
                                  along(before->linear).length(),
-                                 body.computeImpulseDenominator(place, normal) / body.getInvMass()};
+                                 body.computeImpulseDenominator(place, normal) / body.getInvMass(),
+                                 (place - before->centre).length(),
+                                 body.getGravity().length()};
         if (impact.speed < groundRestSpeed * seconds * body.getGravity().length()) continue;
         if (!(std::abs(impact.before) > minSlope * impact.speed)) continue;
         const float own = edgeAngleOf(body, bodyIsFirst ? point.m_localPointA : point.m_localPointB);

@@ -21,10 +21,15 @@ struct FacetImpact {
     float after;     ///< the same after the step [m/s]
     float speed;     ///< of the body's centre along the triangle, before the step [m/s]
     float mobility;  ///< the contact point's inverse effective mass times the body's mass; 1 in line with the centre
+    float arm;       ///< distance of the contact point from the body's centre [m]
+    float gravity;   ///< [m/s^2]
 
     /// The energy that the impact takes, up to what edges whose angles sum to this can cause [J]. Negative: it adds
-    /// energy.
+    /// energy. The edges deflect the body, and it tips over them.
     float loss(float angle) const;
+
+  private:
+    float tipping(float angle) const;
 };
 
 /// The friction of a body at a contact with a triangle of the ground, in one step.
