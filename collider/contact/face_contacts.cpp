@@ -111,8 +111,10 @@ std::optional<Contact> FaceContacts::contactOver(const TriangleFace& face, bool 
     const LocalField::FieldSample there = field_.local.at(foot);
     const bool isFar = std::abs(height) > std::abs(there.distance) + field_.spacing + field_.local.maxDisplacement();
     if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
-    if (height <= field_.margin && height_.isExact(index, normal, height, there))
-        return contactAt(place, normal, height);
+    if (height_.isExact(index, normal, height, there)) {
+        const Contact contact = contactAt(place, normal, height);
+        if (contact.remaining() <= field_.margin) return contact;
+    }
     if (isFar || !probesFoot) return std::nullopt;
     if (glm::dot(point.normal, normal) < minFacing || !height_.hasEdgeNear(foot, there.normal, normal))
         return std::nullopt;
