@@ -111,14 +111,22 @@ std::optional<Contact> FaceContacts::contactOver(const TriangleFace& face, bool 
     const LocalField::FieldSample there = field_.local.at(foot);
     const bool isFar = std::abs(height) > std::abs(there.distance) + field_.spacing + field_.local.maxDisplacement();
     if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
-    if (height_.isExact(index, normal, height, there)) {
-        const Contact contact = contactAt(place, normal, height);
-        if (contact.remaining() <= field_.margin) return contact;
-    }
+    if (reaches(face, place, normal, height) && height_.isExact(index, normal, height, there))
+        return contactAt(place, normal, height);
     if (isFar || !probesFoot) return std::nullopt;
     if (glm::dot(point.normal, normal) < minFacing || !height_.hasEdgeNear(foot, there.normal, normal))
         return std::nullopt;
     return contactAtFoot(foot, normal, there);
+}
+
+/// Whether a point over a face is within the margin of it, or meets it in the step.
+bool FaceContacts::reaches(const TriangleFace& face, const glm::vec3& place, const glm::vec3& normal,
+                           float height) const {
+    if (height <= field_.margin) return true;
+    const glm::vec3 foot = place + height * normal;
+    const float approach = field_.local.approach(foot, normal, field_.margin);
+    if (!(height <= approach)) return false;
+    return !face.isOutside(place - height / approach * field_.local.relativeMotion().of(foot), onFace * field_.spacing);
 }
 
 /// The contact of a convex vertex that has penetrated an open surface next to a crease and is over neither triangle: it

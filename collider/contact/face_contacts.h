@@ -52,6 +52,7 @@ class FaceContacts {
                                        const SurfacePoint& point);
     std::optional<Contact> contactBelowCrease(const TriangleFace& face, std::uint32_t index, const glm::vec3& normal,
                                               float height);
+    bool reaches(const TriangleFace& face, const glm::vec3& place, const glm::vec3& normal, float height) const;
     Contact contactAt(const glm::vec3& place, const glm::vec3& normal, float height);
     std::optional<Contact> contactAtFoot(const glm::vec3& foot, const glm::vec3& normal,
                                          const LocalField::FieldSample& there);

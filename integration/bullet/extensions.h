@@ -50,13 +50,14 @@ struct ExtensionOptions {
     /// Smooth ground: bodies with a field keep their energy when they slide or roll over the shallow edges of static
     /// triangle meshes and height fields, as over the smooth surface that the triangles stand for. At each edge whose
     /// faces differ by an angle t, an impact without a bounce takes the fraction sin^2(t) of a body's kinetic energy: a
-    /// block that slides over waves of 0.1 m on cells of its own size loses up to 73 % of its speed in 3 s. At the end
+    /// block that slides over waves of 0.1 m on cells of its own size loses up to 71 % of its speed in 3 s. At the end
     /// of each step, the linear velocity gets back what the step's impulses have taken.
     ///
-    /// - Edges whose faces differ by less than 20 degrees count: the sharpest one of the ground below, the sharpest
-    ///   one of the body's own triangle at the contact, and for a body with such edges its rotation in a step. Impacts
-    ///   get back up to eight times the energy that an edge with the sum of these angles can take at the body's speed.
-    ///   So a drop on the ground is an impact as usual, and a flat floor gives nothing back to a box.
+    /// - Edges whose faces differ by less than 20 degrees count: the sharpest one of the ground below or just behind,
+    ///   the sharpest one of the body's own triangle at the contact, and for a body with such edges its rotation in a
+    ///   step. Impacts get back up to eight times the energy that an edge with the sum of these angles can take at the
+    ///   body's speed, and that of a body that tips over it. So a drop on the ground is an impact as usual, and a flat
+    ///   floor gives nothing back to a box.
     /// - A body that rolls also gets back what friction takes at such impacts: where its contact point slips by no more
     ///   than they cause, which is the square of the sum's tangent, in parts of the speed. Friction that brakes a
     ///   sliding body counts as usual.

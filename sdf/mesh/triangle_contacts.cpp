@@ -78,9 +78,9 @@ class TriangleOverlap {
     const EdgePlanes& edges_;
 };
 
-/// Whether a neighbour leads away from what it shares with a face, so that all else of it that comes near the face is
-/// within `negligible` of a shared vertex. Seen along the normal, a point of it that is no farther than the slack
-/// beyond the face's edges is at most slack / minSlope from the vertex. True for most neighbours.
+/// Whether a neighbour leads away from the edge or vertex that it shares with a face, so that nothing else of it comes
+/// near the face. Seen along the normal, points of its other edges that are no farther than the slack beyond the face's
+/// edges are at most slack / minSlope from a shared vertex. True for most neighbours.
 /// @param a, b  vertices of the face and of the neighbour, whose corners are given
 bool leadsAway(const glm::uvec3& a, const glm::uvec3& b, const TriangleCorners& corners, const EdgePlanes& edges) {
     constexpr double minSlope = 1.05 / negligible;

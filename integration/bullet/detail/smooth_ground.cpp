@@ -57,7 +57,7 @@ bool isGround(const btCollisionObject& object) {
 btVector3 flightOf(const btRigidBody& body, float size) {
     const float speed = body.getLinearVelocity().length(), gravity = body.getGravity().length();
     const float flown = 2 * speed * speed * maxSmoothSlope / gravity;
-    return speed > 0 ? std::min(flown, size) / speed * body.getLinearVelocity() : btVector3(0, 0, 0);
+    return speed > 0 ? (flown < size ? flown : size) / speed * body.getLinearVelocity() : btVector3(0, 0, 0);
 }
 
 /// The maximum angle between faces at the smooth edges in the bounding box of a body, and behind it as far as it flies
@@ -109,8 +109,9 @@ float edgeAngleOf(const btRigidBody& body, const btVector3& place) {
 
 }  // namespace
 
-/// Twice the energy per mass of the fall of a body that has tipped over an edge. Its centre accelerates from the edge
-/// as it moves on, until the body has turned by the angle; for a body whose radius of gyration about the edge is `arm`.
+/// Twice the energy per mass of the fall of a body that has tipped over an edge. Its weight accelerates its rotation
+/// with the distance of its centre from the edge, until it has turned by the angle. `arm` stands for its radius of
+/// gyration about the edge.
 float FacetImpact::tipping(float angle) const {
     const float slope = std::tan(angle), beyondEdge = std::cbrt(6 * arm * arm * slope * speed * speed / gravity);
     return gravity > 0 ? 2 * gravity * std::min(beyondEdge, arm) * slope : 0;
@@ -118,8 +119,9 @@ float FacetImpact::tipping(float angle) const {
 
 float FacetImpact::loss(float angle) const {
     const float deflected = speed * std::tan(angle);
-    const float caused = maxEnergyRatio * mobility * deflected * deflected + (mobility - 1) * tipping(angle);
-    return -0.5f * impulse * (before + after) * std::min(caused / (before * before), 1.f);
+    const float tipped = std::min((mobility - 1) * tipping(angle), turning * turning);
+    const float caused = maxEnergyRatio * mobility * deflected * deflected + tipped, approach = before * before;
+    return -0.5f * impulse * (before + after) * (caused < approach ? caused / approach : 1);
 }
 
 float FacetFriction::loss(float angle) const {
@@ -168,7 +170,8 @@ float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& g
                                  along(before->linear).length(),
                                  body.computeImpulseDenominator(place, normal) / body.getInvMass(),
                                  (place - before->centre).length(),
-                                 body.getGravity().length()};
+                                 -normal.dot(body.getGravity()),
+                                 normal.dot(pointBefore - before->linear)};
         if (impact.speed < groundRestSpeed * seconds * body.getGravity().length()) continue;
         if (!(std::abs(impact.before) > minSlope * impact.speed)) continue;
         const float own = edgeAngleOf(body, bodyIsFirst ? point.m_localPointA : point.m_localPointB);

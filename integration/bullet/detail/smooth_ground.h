@@ -22,7 +22,8 @@ struct FacetImpact {
     float speed;     ///< of the body's centre along the triangle, before the step [m/s]
     float mobility;  ///< the contact point's inverse effective mass times the body's mass; 1 in line with the centre
     float arm;       ///< distance of the contact point from the body's centre [m]
-    float gravity;   ///< [m/s^2]
+    float gravity;   ///< towards the triangle [m/s^2]
+    float turning;   ///< what the body's rotation contributes to `before` [m/s]
 
     /// The energy that the impact takes, up to what edges whose angles sum to this can cause [J]. Negative: it adds
     /// energy. The edges deflect the body, and it tips over them.
