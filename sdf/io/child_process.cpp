@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -26,6 +27,8 @@ namespace {
 constexpr int answerPipe = 3;          // file descriptor in the child: the first after the standard streams
 constexpr int pipeCapacity = 1 << 20;  // [bytes]: needs fewer context switches than the usual 64 kB
 constexpr int diedBeforeAnswer = 127;  // exit status
+constexpr char startMark = 's';        // the child's first byte
+constexpr std::chrono::milliseconds firstStartTime{20}, maxStartTime{10000};
 
 // Blocks signals until the child has removed the caller's handlers.
 class SignalsBlocked {
@@ -91,14 +94,24 @@ void send(const void* bytes, std::size_t count) {
     }
 }
 
-[[noreturn]] void live(int pipe, std::size_t addressLimit, const ChildProcess::Work& work) noexcept {
+// Ends this process by SIGALRM after `time`; zero: never.
+void setAlarm(std::chrono::microseconds time) {
+    const itimerval once{{0, 0}, {time.count() / 1000000, time.count() % 1000000}};
+    ::setitimer(ITIMER_REAL, &once, nullptr);
+}
+
+[[noreturn]] void live(int pipe, std::chrono::milliseconds startTime, std::size_t addressLimit,
+                       const ChildProcess::Work& work) noexcept {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     ::prctl(PR_SET_DUMPABLE, 0);
-    takeDefaultEnds();
     takeDefaultSignals();
+    setAlarm(startTime);
+    takeDefaultEnds();  // waits for ever if another thread of the caller was registering an exit handler at the fork
+    setAlarm({});
     const rlimit memory{addressLimit, addressLimit};
     ::setrlimit(RLIMIT_AS, &memory);
     if (keepOnly(pipe)) try {
+            send(&startMark, 1);
             work(send);
             ::_exit(0);
         } catch (...) {
@@ -108,45 +121,76 @@ void send(const void* bytes, std::size_t count) {
 
 }  // namespace
 
-ChildProcess::ChildProcess(const ChildLimits& limits, const Work& work) : time_(limits.time) {
+ChildProcess::ChildProcess(const ChildLimits& limits, const Work& work)
+    : time_(limits.time), deadline_(std::chrono::steady_clock::now() + limits.time) {
+    const std::size_t addressLimit = addressSpace() + limits.memory;
+    try {
+        for (auto startTime = firstStartTime;; startTime *= 2) {
+            start(startTime, addressLimit, work);
+            if (hasStarted()) return;
+            end();
+            if (startTime > maxStartTime) throw ChildFailure("did not start");
+        }
+    } catch (...) {
+        end();
+        throw;
+    }
+}
+
+ChildProcess::~ChildProcess() {
+    end();
+}
+
+void ChildProcess::start(std::chrono::milliseconds startTime, std::size_t addressLimit, const Work& work) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "no pipe");
     ::fcntl(ends[1], F_SETPIPE_SZ, pipeCapacity);  // best effort: the system may allow less
-    const std::size_t addressLimit = addressSpace() + limits.memory;
+    pipe_ = ends[0];
     int error = 0;
     {
         const SignalsBlocked blocked;
         process_ = ::fork();
         error = errno;
-        if (process_ == 0) live(ends[1], addressLimit, work);
+        if (process_ == 0) live(ends[1], startTime, addressLimit, work);
     }
     ::close(ends[1]);
-    pipe_ = ends[0];
-    deadline_ = std::chrono::steady_clock::now() + limits.time;
-    if (process_ > 0) return;
-    ::close(pipe_);
-    throw std::system_error(error, std::generic_category(), "no child process");
+    if (process_ < 0) throw std::system_error(error, std::generic_category(), "no child process");
 }
 
-ChildProcess::~ChildProcess() {
-    ::close(pipe_);
+bool ChildProcess::hasStarted() {
+    char mark = 0;
+    return receiveSome(&mark, 1) == 1 && mark == startMark;
+}
+
+void ChildProcess::end() noexcept {
+    if (pipe_ >= 0) ::close(pipe_);
+    pipe_ = -1;
     if (process_ <= 0) return;
     // Until the child is reaped, here or by the caller's own handler, its process id stays valid.
-    if (::waitpid(process_, nullptr, WNOHANG) != 0) return;
-    ::kill(process_, SIGKILL);
-    while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {
+    if (::waitpid(process_, nullptr, WNOHANG) == 0) {
+        ::kill(process_, SIGKILL);
+        while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {
+        }
     }
+    process_ = -1;
 }
 
 void ChildProcess::receive(void* bytes, std::size_t count) {
     char* to = static_cast<char*>(bytes);
     while (count > 0) {
-        waitForBytes();
-        const ssize_t got = ::read(pipe_, to, count);
-        if (got < 0 && errno == EINTR) continue;
-        if (got <= 0) throwEnd();
+        const std::size_t got = receiveSome(to, count);
+        if (got == 0) throwEnd();
         to += got;
-        count -= std::size_t(got);
+        count -= got;
+    }
+}
+
+std::size_t ChildProcess::receiveSome(char* bytes, std::size_t count) {
+    for (;;) {
+        waitForBytes();
+        const ssize_t got = ::read(pipe_, bytes, count);
+        if (got < 0 && errno == EINTR) continue;
+        return std::size_t(std::max<ssize_t>(got, 0));
     }
 }
 

@@ -29,7 +29,9 @@ class ChildFailure : public std::runtime_error {
 /// locate one. Only the calling thread continues in the child. glibc resets its own locks (malloc, stdio, the loader)
 /// at a fork, so `work` may allocate and throw. A malloc that replaces glibc's must do so too, as jemalloc and tcmalloc
 /// do. `work` must not start threads or use TBB, nor take any lock that another thread of the caller may hold: it would
-/// wait until its time limit.
+/// wait until its time limit. The lock for exit handlers is an exception: C++ takes it for each static object with a
+/// destructor, in the libraries of the caller and of `work`, and glibc keeps it locked in a child that was forked in
+/// that moment. The child takes it first, and is started again if it cannot.
 ///
 /// The child has no signal handlers, no files except its pipe and /dev/null, never writes core files, and ends with the
 /// thread that created it. It exits without exit handlers and without flushing the caller's streams. If a caller
@@ -41,7 +43,8 @@ class ChildProcess {
     /// An exception from this function ends the child without an answer.
     using Work = std::function<void(const Send&)>;
 
-    /// Throws std::system_error if no process can be created.
+    /// Returns when the child has started. Throws std::system_error if no process can be created, and ChildFailure if
+    /// the child does not start within the time limit.
     ChildProcess(const ChildLimits& limits, const Work& work);
     ~ChildProcess();
     ChildProcess(const ChildProcess&) = delete;
@@ -51,6 +54,10 @@ class ChildProcess {
     void receive(void* bytes, std::size_t count);
 
   private:
+    void start(std::chrono::milliseconds startTime, std::size_t addressLimit, const Work& work);
+    bool hasStarted();
+    void end() noexcept;
+    std::size_t receiveSome(char* bytes, std::size_t count);  // 0: the child closed the pipe
     void waitForBytes();
     [[noreturn]] void throwEnd();
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/io/child_process.h"
 
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -33,18 +34,14 @@ using namespace std::chrono_literals;
 namespace {
 
 // The sanitizers replace malloc, without its preparation of locks for a fork.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool usualMalloc = false;
-#else
-constexpr bool usualMalloc = true;
-#endif
+const bool usualMalloc = !::dlsym(RTLD_DEFAULT, "__sanitizer_get_allocated_size");
 
 constexpr ChildLimits ample{60s, std::size_t(1) << 30};
 
 // The error message for failed work
 std::string failureOf(const ChildProcess::Work& work, const ChildLimits& limits = ample) {
-    ChildProcess child(limits, work);
     try {
+        ChildProcess child(limits, work);
         char byte = 0;
         child.receive(&byte, 1);
     } catch (const ChildFailure& failure) {
@@ -219,6 +216,25 @@ TEST_CASE("child processes start while other threads are busy") {
     stop = true;
     busy.join();
     CHECK(right == 100);
+    CHECK(hasNoChildren());
+}
+
+TEST_CASE("child processes start while other threads register exit handlers") {
+    if (!usualMalloc) return;
+    std::atomic<bool> stop = false;
+    std::thread registering([&] {
+        while (!stop) {
+            std::at_quick_exit([] {});
+            std::this_thread::sleep_for(100us);
+        }
+    });
+    const auto answer = [](const ChildProcess::Send& send) {
+        std::at_quick_exit([] {});
+        send("x", 1);
+    };
+    for (int i = 0; i < 100; ++i) CHECK(failureOf(answer) == "an answer");
+    stop = true;
+    registering.join();
     CHECK(hasNoChildren());
 }
 
