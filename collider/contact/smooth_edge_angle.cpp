@@ -9,8 +9,6 @@
 namespace bilayer::detail {
 namespace {
 
-/// An edge is smooth if the normals of its faces differ by less than 20 degrees (cosine).
-constexpr float smoothCosine = 0.94f;
 /// Smaller angles are rounding of normals [rad].
 constexpr double minAngle = 1e-3;
 /// Predicted contacts stay this close to their surface [voxels].
@@ -24,7 +22,7 @@ float maxSmoothEdgeAngle(std::span<const Triangle> triangles) {
     for (std::uint32_t t = 0; t < triangles.size(); ++t)
         for (int i = 0; i < 3; ++i) {
             const auto conormals = adjacency.conormalsOf(t, i);
-            if (!conormals || !(-glm::dot((*conormals)[0], (*conormals)[1]) > smoothCosine)) continue;
+            if (!conormals || !(-glm::dot((*conormals)[0], (*conormals)[1]) > smoothEdgeCosine)) continue;
             maxSine = std::max(maxSine, glm::length(glm::cross((*conormals)[0], (*conormals)[1])));
         }
     return std::asin(std::min(maxSine, 1.f));
@@ -43,7 +41,7 @@ float smoothEdgeAngleAt(const MeshTree& tree, const glm::vec3& point) {
     for (int i = 0; i < 3; ++i) {
         const glm::dvec3 edge = tree.featureOf(triangle, 0.5 * (p[i] + p[(i + 1) % 3])).normal;
         const double angle = 2 * std::atan2(glm::length(glm::cross(face, edge)), glm::dot(face, edge));
-        if (angle > minAngle && std::cos(angle) > double(smoothCosine)) maxAngle = std::max(maxAngle, angle);
+        if (angle > minAngle && std::cos(angle) > double(smoothEdgeCosine)) maxAngle = std::max(maxAngle, angle);
     }
     return float(maxAngle);
 }

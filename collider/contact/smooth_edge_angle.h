@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The angles between the faces of a surface of triangles at its smooth edges, where they are below 20 degrees.
+// The angles between the faces of a surface of triangles at its smooth edges.
 // Tested by tests/bullet/smooth_ground.cpp.
 #pragma once
 
@@ -10,6 +10,9 @@
 #include "collider/field/mesh_tree.h"
 
 namespace bilayer::detail {
+
+/// An edge is smooth if the normals of its faces differ by less than 20 degrees (cosine).
+constexpr float smoothEdgeCosine = 0.94f;
 
 /// The maximum angle between the normals of two faces at the smooth edges of triangles; 0 if there are none [rad].
 float maxSmoothEdgeAngle(std::span<const Triangle> triangles);

@@ -34,7 +34,7 @@ constexpr float groundRestSpeed = 2;
 // Approach velocities below this fraction of the speed along the ground are rounding.
 constexpr float minSlope = 1e-3f;
 // Slope beyond the steepest smooth edge.
-constexpr float maxSmoothSlope = 0.364f;  // tan(20 degrees)
+const float maxSmoothSlope = std::tan(std::acos(smoothEdgeCosine));
 // Maximum change of a body's kinetic energy in a step, relative.
 constexpr float maxChange = 0.2f;
 
