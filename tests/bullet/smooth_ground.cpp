@@ -97,7 +97,8 @@ TEST_CASE("Slow blocks that tip over crests, and fast ones that fly over them, k
     Shape block(exactBox({0.3f, 0.3f, 0.15f}, voxel));
     double sum = 0, sumWithout = 0;
     for (int i = 0; i < 12; ++i) {
-        const float angle = float(random(0.08, 0.3)), speed = float(random(0.5, 2.5)), steps = float(120 << i % 2);
+        const float angle = float(random(0.08, 0.34)), steps = float(120 << i % 2);
+        const float speed = float(i % 3 ? random(0.5, 2.5) : random(0.3, 0.5));
         CAPTURE(seed, i, angle, speed, steps);
         // a flat ground that falls off beyond a crest
         const float slope = std::tan(angle);
@@ -107,8 +108,10 @@ TEST_CASE("Slow blocks that tip over crests, and fast ones that fly over them, k
             Slider slider(*ground.shape, block, {-0.5f, 0, 0.15f}, {speed, 0, 0});
             const WorldExtensions extensions(slider.world.dynamics, {.smoothGround = smoothGround});
             const double start = slider.energy();
-            slider.run(2 / speed, steps);
-            REQUIRE(slider.body->getCenterOfMassPosition().x() > 1);
+            for (int step = 0; slider.body->getCenterOfMassPosition().x() < 1; ++step) {
+                REQUIRE(float(step) < 4 / speed * steps);
+                slider.world.dynamics.stepSimulation(1 / steps, 0);
+            }
             return (start - slider.energy()) / kineticEnergyOf(*slider.body);
         };
         const double loss = lossOf(true);

@@ -36,7 +36,7 @@ constexpr float minSlope = 1e-3f;
 // Slope beyond the steepest smooth edge.
 const float maxSmoothSlope = std::tan(std::acos(smoothEdgeCosine));
 // Maximum change of a body's kinetic energy in a step, relative.
-constexpr float maxChange = 0.2f;
+constexpr float maxChange = 0.5f;
 
 bool isTriangles(const btCollisionShape& shape) {
     const int type = shape.getShapeType();
