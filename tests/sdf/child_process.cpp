@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sdf/io/child_process.h"
 
-#include <dlfcn.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -32,9 +31,6 @@ using namespace bilayer::detail;
 using namespace std::chrono_literals;
 
 namespace {
-
-// The sanitizers replace malloc, without its preparation of locks for a fork.
-const bool usualMalloc = !::dlsym(RTLD_DEFAULT, "__sanitizer_get_allocated_size");
 
 constexpr ChildLimits ample{60s, std::size_t(1) << 30};
 
@@ -198,7 +194,7 @@ TEST_CASE("a child process answers where the caller has no standard streams") {
 }
 
 TEST_CASE("child processes start while other threads are busy") {
-    if (!usualMalloc) return;
+    if (test::isSanitized()) return;
     test::Gltf gltf = test::Gltf::cube();
     const auto path = gltf.write("busy.gltf");
     std::atomic<bool> stop = false;
@@ -220,7 +216,7 @@ TEST_CASE("child processes start while other threads are busy") {
 }
 
 TEST_CASE("child processes start while other threads register exit handlers") {
-    if (!usualMalloc) return;
+    if (test::isSanitized()) return;
     std::atomic<bool> stop = false;
     std::thread registering([&] {
         while (!stop) {

@@ -11,6 +11,7 @@
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
 #include "tests/sdf/unsigned_band.h"
+#include "tests/support/support.h"
 
 namespace bilayer::threads_test {
 TEST_CASE("the bytes do not depend on the number of threads") {
@@ -35,9 +36,8 @@ TEST_CASE("a build limits its own threads only") {
     CHECK(during == before);
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers keep memory
-
 TEST_CASE("many builds on a given number of threads take no more memory than a few") {
+    if (test::isSanitized()) return;
     const auto residentBytes = [] {
         std::size_t all = 0, resident = 0;
         std::ifstream("/proc/self/statm") >> all >> resident;
@@ -52,6 +52,4 @@ TEST_CASE("many builds on a given number of threads take no more memory than a f
     buildSome(1000);
     CHECK(residentBytes() - before < 3e6);
 }
-
-#endif
 }  // namespace bilayer::threads_test

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/support/support.h"
 
+#include <dlfcn.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -50,6 +51,10 @@ std::optional<std::filesystem::path> corpusMesh(const std::string& name) {
 std::filesystem::path scratch(const std::string& name) {
     static const Scratch once;
     return once.folder / name;
+}
+
+bool isSanitized() {
+    return ::dlsym(RTLD_DEFAULT, "__sanitizer_get_allocated_size");
 }
 
 unsigned seed() {

@@ -22,6 +22,10 @@ std::filesystem::path scratch(const std::string& name);
 /// prints it with every failure.
 unsigned seed();
 
+/// Whether the address or the thread sanitizer, of any compiler, replaces this program's malloc. It keeps freed memory,
+/// ends a program that requests too much, takes terabytes of address space, and does not prepare its locks for a fork.
+bool isSanitized();
+
 /// The squared distance from a point to a triangle in double precision, by the Voronoi regions of its features in the
 /// plane. Independent of the library's own code.
 double squaredDistance(const glm::dvec3& point, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);

@@ -24,12 +24,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool isSanitized = true;  // needs terabytes of address space, and to be loaded first
-#else
-constexpr bool isSanitized = false;
-#endif
-
 std::set<std::string> namesIn(const fs::path& folder) {
     std::set<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename());
@@ -50,7 +44,7 @@ void requireOrderlyEnd(const Result& r) {
 }  // namespace
 
 TEST_CASE("whichever write fails, the old file stays and no part of a new one") {
-    if (isSanitized) return;
+    if (isSanitized()) return;
     const std::string field = scratch("coarse.vdb").string();
     REQUIRE(run(buildTo(field, "0.2")).status == 0);
     const fs::path folder = emptyFolder("failing_writes");
@@ -163,7 +157,7 @@ TEST_CASE("outputs may have any name") {
 }
 
 TEST_CASE("little memory ends a build with one line") {
-    if (isSanitized) return;
+    if (isSanitized()) return;
     // the program alone needs about 120 MiB of address space
     for (const long mebibytes : {140, 160, 180, 200, 240, 300, 400, 600}) {
         CAPTURE(mebibytes);
