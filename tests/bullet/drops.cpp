@@ -65,7 +65,7 @@ TEST_CASE("an open surface that sticks out of a body bears it") {
         for (int i = 0; i < 8; ++i) {
             const Drop result =
                 drop(collider, *ground.shape, {randomRotation(random), glm::vec2(random.point(0.3))}, 2);
-            CAPTURE(ground.name, i);
+            CAPTURE(ground.name, i, result.sidewaysContacts);
             CHECK(result.gain < maxEnergyGain);
             CHECK_FALSE(result.fell);
         }

@@ -169,6 +169,7 @@ TEST_CASE("tiles choose the signs of the whole mesh") {
     std::mt19937 random(seed);
     std::size_t built = 0;
     for (int round = 0; round < 16; ++round) {
+        CAPTURE(round);
         Mesh mesh = randomSolids(random, false);
         if (round % 4 == 3)  // triangles that orienting the mesh flips
             for (int i = 0; i < 3; ++i) {
