@@ -247,6 +247,7 @@ TEST_CASE("Bodies that fall flat without friction do not drift sideways") {
             body->setActivationState(DISABLE_DEACTIVATION);
             for (int step = 0; step < 60; ++step) world.dynamics.stepSimulation(1 / 60.f, 0);
             const btVector3 velocity = body->getLinearVelocity(), at = body->getCenterOfMassPosition();
+            CAPTURE(place.x(), place.y(), place.z());
             CHECK(std::hypot(velocity.x(), velocity.y()) < 1e-3f);
             CHECK(std::hypot(at.x() - place.x(), at.y() - place.y()) < 1e-3f);
         }
