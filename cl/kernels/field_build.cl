@@ -72,8 +72,15 @@ SHARED uchar* growSides(SHARED uchar* from, SHARED uchar* to, SHARED uint* bits)
     }
 }
 
+// edgeOfBand() of sdf/leaf/band.h [m].
+float edgeOfBand(float width, float voxelSize) {
+    return width * voxelSize - BAND_EDGE * voxelSize;
+}
+
+// Whether a signed distance lies in the band [m].
 bool isActive(float distance, const Widths* widths) {
-    return distance < widths->exterior - BAND_EDGE && distance > BAND_EDGE - widths->interior;
+    return distance < edgeOfBand(widths->exterior, widths->voxelSize) &&
+           distance > -edgeOfBand(widths->interior, widths->voxelSize);
 }
 
 // Racy reads avoid most of the atomic operations: bounds only ever widen.
@@ -104,7 +111,7 @@ GROUP_KERNEL void trimBlocks(global const int* origins, global const float* dist
         const uint side = d == INFINITY ? NO_SIDE : signbit(d) ? INSIDE : OUTSIDE;
         first[v] = (uchar)(side);
         has |= side == NO_SIDE ? OPEN : side;
-        if (!isActive(d, &widths)) continue;
+        if (!isActive(d * widths.voxelSize, &widths)) continue;
         has |= ACTIVE;
         const int3 place =
             (int3)((int)(v) / (BLOCK_SIDE * BLOCK_SIDE), (int)(v) / BLOCK_SIDE % BLOCK_SIDE, (int)(v) % BLOCK_SIDE);
@@ -124,8 +131,10 @@ GROUP_KERNEL void trimBlocks(global const int* origins, global const float* dist
     if (!needed) return;
     SHARED const uchar* side = has & OPEN ? growSides(first, second, bits) : first;
     const float outside = widths.exterior * widths.voxelSize, inside = -widths.interior * widths.voxelSize;
-    for (uint v = ITEM; v < BLOCK_VOXELS; v += ITEMS)
-        out[v] = isActive(in[v], &widths) ? in[v] * widths.voxelSize : side[v] == INSIDE ? inside : outside;
+    for (uint v = ITEM; v < BLOCK_VOXELS; v += ITEMS) {
+        const float d = in[v] * widths.voxelSize;
+        out[v] = isActive(d, &widths) ? d : side[v] == INSIDE ? inside : outside;
+    }
     if (ITEM > 0) return;
     for (uint i = 1; i < ITEMS; ++i) {
         low = min(low, lowest[i]);

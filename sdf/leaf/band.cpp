@@ -37,15 +37,16 @@ inline Mask getBits(const BlockMask& bits, int voxel) {
 void sortVoxels(const float* distances, const BandWidths& widths, BlockMask& unknown, BlockMask& inside,
                 BlockMask& band) {
     const Tag tag;
+    const auto size = hn::Set(tag, widths.voxelSize), highest = hn::Set(tag, edgeOfBand(widths.exterior, widths.voxelSize)),
+               lowest = hn::Set(tag, -edgeOfBand(widths.interior, widths.voxelSize));
     unknown = inside = band = {};
     for (int i = 0; i < blockVoxels; i += int(hn::Lanes(tag))) {
         const auto d = hn::LoadU(tag, distances + i);
         setBits(hn::Eq(d, hn::Set(tag, std::numeric_limits<float>::infinity())), i, unknown);
         setBits(hn::MaskFromVec(hn::BitCast(tag, hn::BroadcastSignBit(hn::BitCast(hn::RebindToSigned<Tag>(), d)))), i,
                 inside);
-        setBits(hn::And(hn::Lt(d, hn::Set(tag, widths.exterior - bandEdge)),
-                        hn::Gt(d, hn::Set(tag, bandEdge - widths.interior))),
-                i, band);
+        const auto metres = hn::Mul(d, size);
+        setBits(hn::And(hn::Lt(metres, highest), hn::Gt(metres, lowest)), i, band);
     }
 }
 

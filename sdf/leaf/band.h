@@ -50,6 +50,12 @@ struct BandMasks {
 /// thus gives the same voxels with any rounding.
 inline constexpr float bandEdge = 1e-5f;
 
+/// Voxels of the band are closer to the surface than this [m]. Compared in metres, so that a distance is on the same
+/// side of the edge before and after it is stored.
+inline float edgeOfBand(float width, float voxelSize) {
+    return width * voxelSize - bandEdge * voxelSize;
+}
+
 /// Converts the signed distances of a block [voxels] to the values of a leaf [m]. Voxels with -interior < distance <
 /// exterior are active; others hold +exterior or -interior. Voxels of unknown distance take the sign of connected known
 /// voxels in the block, the nearest first. Returns false and writes nothing if no distance is known.

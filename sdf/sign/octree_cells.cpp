@@ -106,7 +106,8 @@ BlockMask farther(const float* distances, float limit) {
 
 void signLeaf(BandLeaf& leaf, const BlockMask& inside, const BandWidths& widths) {
     const float exterior = widths.exterior * widths.voxelSize, interior = widths.interior * widths.voxelSize;
-    const float edge = bandEdge * widths.voxelSize;
+    const float exteriorEdge = edgeOfBand(widths.exterior, widths.voxelSize),
+                interiorEdge = edgeOfBand(widths.interior, widths.voxelSize);
     float* values = leaf.buffer().data();
     BandLeaf::NodeMaskType active;
     for (std::size_t x = 0; x < blockSide; ++x) {
@@ -114,10 +115,9 @@ void signLeaf(BandLeaf& leaf, const BlockMask& inside, const BandWidths& widths)
         for (unsigned i = 0; i < 64; ++i) {
             float& value = values[x * 64 + i];
             const bool in = (inside[x] >> i) & 1;
-            const float width = in ? interior : exterior;
-            const bool isInBand = value < width - edge;
+            const bool isInBand = value < (in ? interiorEdge : exteriorEdge);
             band |= std::uint64_t(isInBand) << i;
-            if (!isInBand) value = width;
+            if (!isInBand) value = in ? interior : exterior;
             if (in) value = -value;
         }
         active.getWord<std::uint64_t>(openvdb::Index(x)) = band;

@@ -5,7 +5,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <vector>
+
+#include "sdf/sign/octree_cells.h"
+#include "tests/support/support.h"
 
 namespace bilayer::band_test {
 using namespace bilayer::detail;
@@ -39,6 +43,31 @@ TEST_CASE("a block is trimmed to the band, exclusive of its widths") {
     CHECK(count == 3);
     CHECK(((masks.active[1] >> (2 * 8 + 3)) & 1) == 1);
     CHECK(((masks.active[1] >> (2 * 8 + 7)) & 1) == 1);
+}
+
+TEST_CASE("a block has the same band if its signs come later, up to the last bit of a distance") {
+    const unsigned seed = bilayer::test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> size(0.001f, 2), width(0.6f, 6), beyond(-2 * bandEdge, bandEdge);
+    std::vector<float> distances(blockVoxels), values(blockVoxels);
+    for (int round = 0; round < 200; ++round) {
+        const BandWidths widths{width(random), width(random), size(random)};
+        BandMasks masks{}, wide{};
+        for (float& d : distances)
+            d = random() % 2 ? widths.exterior + beyond(random) : -widths.interior - beyond(random);
+        REQUIRE(trimToBand(distances.data(), widths, values.data(), masks));
+
+        BandLeaf leaf(openvdb::Coord(0));
+        std::vector<float> unsignedDistances = distances;
+        for (float& d : unsignedDistances) d = std::abs(d);
+        REQUIRE(trimToBand(unsignedDistances.data(), {8, 8, widths.voxelSize}, leaf.buffer().data(), wide));
+        signLeaf(leaf, masks.inside, widths);
+        for (unsigned i = 0; i < unsigned(blockVoxels); ++i) {
+            CHECK(leaf.isValueOn(i) == bilayer::detail::test(masks.active, i));
+            CHECK(leaf.getValue(i) == values[i]);
+        }
+    }
 }
 
 TEST_CASE("unknown voxels take the sign that they are connected with") {
