@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
@@ -24,11 +25,15 @@ class Sweep {
           rotation_(motion.rotation),
           orientation_(glm::normalize(glm::dquat(centre.rotation))) {}
 
-    /// The motion that ends at a pose.
-    static Sweep endingAt(const Pose& end, const Motion& motion) {
-        Sweep sweep(end, motion);
-        sweep.start_ -= sweep.displacement_;
-        sweep.orientation_ = sweep.rotated(-1);
+    /// The motion from one pose to another, by less than half a turn.
+    static Sweep between(const Pose& start, const Pose& end) {
+        Sweep sweep(start, {});
+        sweep.displacement_ = glm::dvec3(end.position) - sweep.start_;
+        glm::dquat turn = glm::normalize(glm::dquat(end.rotation)) * glm::conjugate(sweep.orientation_);
+        if (turn.w < 0) turn = -turn;
+        const glm::dvec3 axis(turn.x, turn.y, turn.z);
+        const double sine = glm::length(axis);
+        if (sine > 0) sweep.rotation_ = 2 * std::atan2(sine, turn.w) / sine * axis;
         return sweep;
     }
 

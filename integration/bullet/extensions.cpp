@@ -35,13 +35,13 @@ class WorldExtensions::Hook : public btActionInterface {
         if (options.restStabilisation) rest.emplace(world);
         if (options.smoothGround) ground_.emplace(world);
         if (options.gyroscopicIntegration) gyroscopic_.emplace(world);
-        if (ground_ || gyroscopic_) join();
+        if (actsBefore()) join();
         world_.addAction(this);
     }
 
     ~Hook() override {
         world_.removeAction(this);
-        if (ground_ || gyroscopic_) leave();
+        if (actsBefore()) leave();
     }
 
     void updateAction(btCollisionWorld*, btScalar seconds) override {
@@ -49,7 +49,7 @@ class WorldExtensions::Hook : public btActionInterface {
         if (collision) collision->afterStep(seconds);
         if (rest) rest->afterStep(seconds);
         if (gyroscopic_) gyroscopic_->afterStep();
-        if (!ground_ && !gyroscopic_) return;
+        if (!actsBefore()) return;
         const std::lock_guard lock(mutex_);
         takePreTick(worlds_.at(&world_));
     }
@@ -72,13 +72,17 @@ class WorldExtensions::Hook : public btActionInterface {
             if (const auto found = worlds_.find(world); found != worlds_.end()) all = found->second;
         }
         if (all.users) all.users(world, seconds);
-        for (Hook* hook : all.hooks)
+        for (Hook* hook : all.hooks) {
+            if (hook->collision) hook->collision->beforeStep();
             if (hook->gyroscopic_) hook->gyroscopic_->beforeStep(seconds);
+        }
         // one of them is enough
         const auto ground =
             std::find_if(all.hooks.begin(), all.hooks.end(), [](Hook* hook) { return hook->ground_.has_value(); });
         if (ground != all.hooks.end()) (*ground)->ground_->beforeStep();
     }
+
+    bool actsBefore() const { return collision || ground_ || gyroscopic_; }
 
     void join() {
         const std::lock_guard lock(mutex_);

@@ -25,8 +25,7 @@ struct ExtensionOptions {
     /// Bodies that move less than a margin in a step cost almost nothing. The results are the same bits for any number
     /// of threads. Not handled are:
     /// - shapes with speculative == false, pairs without a field, and kinematic bodies;
-    /// - btGImpactMeshShape, which still gets the Dispatcher's speculative contacts;
-    /// - a body that Bullet's own CCD has stopped in this step.
+    /// - btGImpactMeshShape, which still gets the Dispatcher's speculative contacts.
     bool continuousCollision = true;
 
     /// Rest stabilisation: bodies at rest keep their positions. Bullet's solver leaves them some velocity in each step.

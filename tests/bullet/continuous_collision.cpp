@@ -110,6 +110,42 @@ TEST_CASE("No body passes through a thin plate or gains energy, at any speed and
             }
 }
 
+TEST_CASE("A body is stopped on the path that it took, whatever changes its velocity after it has moved") {
+    struct Kick : btActionInterface {
+        btRigidBody* body = nullptr;
+        btVector3 velocity{0, 0, 0};
+        void updateAction(btCollisionWorld*, btScalar) override { body->setLinearVelocity(velocity); }
+        void debugDraw(btIDebugDraw*) override {}
+    };
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> any(-1, 1);
+    Shape ball(exactSphere(0.2f, h));
+    Sheet sheet(1.2f);
+    for (int shot = 0; shot < 40; ++shot) {
+        World world;
+        Kick kick;
+        world.dynamics.addAction(&kick);
+        const WorldExtensions guard(world.dynamics);
+        world.dynamics.setGravity({0, 0, 0});
+        world.add(*sheet.shape, 0, {0, 0, 0});
+        kick.body = world.add(ball, 1, {0, 0, 1.f});
+        kick.body->setLinearVelocity({100 * any(random), 100 * any(random), -500});
+        if (shot % 2 == 1) {  // Bullet's own CCD stops it in the sheet
+            kick.body->setCcdMotionThreshold(0.1f);
+            kick.body->setCcdSweptSphereRadius(0.05f);
+        }
+        kick.velocity = 1000 * btVector3(any(random), any(random), any(random));
+        world.dynamics.stepSimulation(step, 0);
+        const btVector3 at = kick.body->getCenterOfMassPosition();
+        CAPTURE(seed, shot, at.x(), at.y(), at.z());
+        CHECK(guard.stoppedBodies() == 1);
+        CHECK(std::abs(at.z() - 0.2f) < 0.1f * h);
+        CHECK(std::max(std::abs(at.x()), std::abs(at.y())) < 0.2f);
+        world.dynamics.removeAction(&kick);
+    }
+}
+
 TEST_CASE("A body stopped by a wall is not overrun by the next body") {
     const float radius = 0.2f;
     // points are followed from 0.25 voxels inside their body to 0.1 below the surface where they enter; and round

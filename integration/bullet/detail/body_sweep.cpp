@@ -2,9 +2,7 @@
 #include "integration/bullet/detail/body_sweep.h"
 
 #include <BulletCollision/CollisionShapes/btCollisionShape.h>
-#include <LinearMath/btTransformUtil.h>
 
-#include <cmath>
 #include <glm/common.hpp>
 
 #include "integration/bullet/detail/convert.h"
@@ -23,28 +21,10 @@ float boundingRadius(const btCollisionObject& object) {
     return centre.length() + radius;
 }
 
-namespace {
-
-/// The motion of a body in the step that has ended. A body that Bullet's own CCD has stopped keeps its velocity, but
-/// its displacement is unknown.
-Motion motionOf(const btRigidBody* body, float seconds) {
-    if (!body || body->getHitFraction() < 1) return {};
-    const glm::vec3 displacement = toGlm(seconds * body->getLinearVelocity());
-    const btVector3& spin = body->getAngularVelocity();
-    const float angle = seconds * spin.length();
-    if (!(angle > 0)) return {displacement};
-    // beyond its limit, Bullet rotates by another angle than that of the angular velocity, but about the same axis
-    const float maxAngle = ANGULAR_MOTION_THRESHOLD;
-    const float rotated = angle > maxAngle ? 2 * std::atan(angle / maxAngle * std::tan(maxAngle / 2)) : angle;
-    return {displacement, toGlm(rotated * spin.normalized())};
-}
-
-}  // namespace
-
-BodySweep::BodySweep(btCollisionObject& object, float seconds)
+BodySweep::BodySweep(btCollisionObject& object, const btTransform& start)
     : object_(object),
       body_(activeDynamicBody(object)),
-      sweep_(Sweep::endingAt(toPose(object.getWorldTransform()), motionOf(body_, seconds))) {}
+      sweep_(Sweep::between(toPose(body_ ? start : object.getWorldTransform()), toPose(object.getWorldTransform()))) {}
 
 float BodySweep::maxDisplacement(const BodySweep& other) const {
     return float(

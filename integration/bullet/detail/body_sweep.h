@@ -20,7 +20,8 @@ float boundingRadius(const btCollisionObject& object);
 /// The sweep of an object over a step that has ended: its motion from the start to the end of the step.
 class BodySweep {
   public:
-    BodySweep(btCollisionObject& object, float seconds);
+    /// @param start  of the step
+    BodySweep(btCollisionObject& object, const btTransform& start);
 
     const btCollisionObject& object() const { return object_; }
     const Sweep& sweep() const { return sweep_; }

@@ -4,6 +4,7 @@
 #include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <LinearMath/btAabbUtil2.h>
+#include <LinearMath/btTransformUtil.h>
 #include <tbb/parallel_for_each.h>
 
 #include <algorithm>
@@ -148,14 +149,15 @@ std::optional<float> marginOf(const btCollisionObject& object) {
 /// The pairs in which a fast body may have tunnelled in a step.
 class SweptPairs {
   public:
-    SweptPairs(btDynamicsWorld& world, float seconds, const RecentlyFastBodies& fastBefore)
-        : world_(world), seconds_(seconds), fastBefore_(fastBefore) {
+    SweptPairs(btDynamicsWorld& world, float seconds, const StatesBefore<btTransform>& starts,
+               const RecentlyFastBodies& fastBefore)
+        : world_(world), seconds_(seconds), starts_(starts), fastBefore_(fastBefore) {
         const btCollisionObjectArray& objects = world.getCollisionObjectArray();
         for (int i = 0; i < objects.size(); ++i)
             if (const auto margin = marginOf(*objects[i])) minMargin_ = std::min(minMargin_, *margin);
         for (int i = 0; i < objects.size(); ++i) {
             if (!activeDynamicBody(*objects[i])) continue;
-            const BodySweep sweep(*objects[i], seconds);
+            const BodySweep sweep(*objects[i], startOf(*objects[i]));
             if (sweep.maxDisplacement() > minMargin_ || fastBefore_.contain(*objects[i])) fast_.push_back(sweep);
         }
         for (std::size_t i = 0; i < fast_.size(); ++i) find(i);
@@ -224,7 +226,7 @@ class SweptPairs {
         world_.getBroadphase()->aabbTest(lower, upper, inBox);
         for (btCollisionObject* object : inBox.objects) {
             if (isFast(*object) || !mayCollide(fast_[i].object(), *object)) continue;
-            add(fast_[i], slow_.try_emplace(object, *object, seconds_).first->second);
+            add(fast_[i], slow_.try_emplace(object, *object, startOf(*object)).first->second);
         }
         // their boxes in the broad phase are out of date
         for (std::size_t j = 0; j < i; ++j) {
@@ -234,6 +236,16 @@ class SweptPairs {
                 mayCollide(fast_[i].object(), fast_[j].object()))
                 add(fast_[i], fast_[j]);
         }
+    }
+
+    /// Where a body was at the start of the step. Its velocity tells, if nothing was recorded.
+    btTransform startOf(const btCollisionObject& object) const {
+        if (const btTransform* start = starts_.find(object)) return *start;
+        btTransform start = object.getWorldTransform();
+        if (const auto* body = btRigidBody::upcast(&object))
+            btTransformUtil::integrateTransform(object.getWorldTransform(), -body->getLinearVelocity(),
+                                                -body->getAngularVelocity(), seconds_, start);
+        return start;
     }
 
     bool isFast(const btCollisionObject& object) const {
@@ -260,6 +272,7 @@ class SweptPairs {
 
     btDynamicsWorld& world_;
     float seconds_;
+    const StatesBefore<btTransform>& starts_;
     const RecentlyFastBodies& fastBefore_;
     float minMargin_ = std::numeric_limits<float>::infinity();  ///< of all fields
     std::vector<BodySweep> fast_;                               ///< in the world's order
@@ -298,8 +311,13 @@ bool ContinuousCollision::serves(const btDispatcher& dispatcher) {
     return served.contains(&dispatcher);
 }
 
+void ContinuousCollision::beforeStep() {
+    starts_.record(world_, [](const btCollisionObject& object) { return object.getWorldTransform(); });
+}
+
 void ContinuousCollision::afterStep(float seconds) {
-    SweptPairs pairs(world_, seconds, fastBodies_);
+    SweptPairs pairs(world_, seconds, starts_, fastBodies_);
+    starts_.clear();
     pairs.resolve();
     stopped_ = pairs.apply(stoppedPairs_);
     fastBodies_.addStep(pairs.fastBodies());

@@ -7,6 +7,8 @@
 #include <array>
 #include <vector>
 
+#include "integration/bullet/detail/states_before.h"
+
 namespace bilayer::bullet::detail {
 
 /// The bodies that one of the last two steps moved by more than a margin. In an impact the solver does not
@@ -39,6 +41,7 @@ class ContinuousCollision {
     ContinuousCollision(const ContinuousCollision&) = delete;
     ContinuousCollision& operator=(const ContinuousCollision&) = delete;
 
+    void beforeStep();
     void afterStep(float seconds);
     int stoppedBodies() const { return stopped_; }  ///< in the last step
 
@@ -50,6 +53,7 @@ class ContinuousCollision {
   private:
     btDynamicsWorld& world_;
     const btDispatcher* const dispatcher_;
+    StatesBefore<btTransform> starts_;
     RecentlyFastBodies fastBodies_;
     std::vector<StoppedPair> stoppedPairs_;  ///< in the last step
     int stopped_ = 0;

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <unordered_map>
 
 #include <bilayer/integration/bullet/shape.h>
@@ -130,16 +129,9 @@ float FacetFriction::loss(float angle) const {
 }
 
 void SmoothGround::beforeStep() {
-    before_.clear();
-    const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
-    for (int i = 0; i < objects.size(); ++i)
-        before_.push_back({objects[i], activeDynamicBody(*objects[i]) ? velocityOf(*objects[i]) : Velocity{}});
-}
-
-const Velocity* SmoothGround::velocityBefore(const btCollisionObject& object) const {
-    const auto index = std::size_t(object.getWorldArrayIndex());
-    const bool isKnown = index < before_.size() && before_[index].object == &object;
-    return isKnown ? &before_[index].velocity : nullptr;
+    before_.record(world_, [](btCollisionObject& object) {
+        return activeDynamicBody(object) ? velocityOf(object) : Velocity{};
+    });
 }
 
 float SmoothGround::edgeAngleUnder(const Ground& ground) {
@@ -150,7 +142,7 @@ float SmoothGround::edgeAngleUnder(const Ground& ground) {
 
 float SmoothGround::lossIn(const btPersistentManifold& manifold, const Ground& ground, float seconds) {
     const btRigidBody& body = *ground.first;
-    const Velocity* before = velocityBefore(body);
+    const Velocity* before = before_.find(body);
     if (!before) return 0;
     const bool bodyIsFirst = manifold.getBody0() == &body;
     const float rotation = before->angular.length() * seconds;

@@ -8,8 +8,8 @@
 
 #include <map>
 #include <utility>
-#include <vector>
 
+#include "integration/bullet/detail/states_before.h"
 #include "integration/bullet/detail/velocity.h"
 
 namespace bilayer::bullet::detail {
@@ -57,16 +57,11 @@ class SmoothGround {
 
   private:
     using Ground = std::pair<const btRigidBody*, const btCollisionObject*>;  ///< a body and the ground under it
-    struct State {
-        const btCollisionObject* object;
-        Velocity velocity;
-    };
-    const Velocity* velocityBefore(const btCollisionObject& object) const;
     float edgeAngleUnder(const Ground& ground);
     float lossIn(const btPersistentManifold& manifold, const Ground& ground, float seconds);
 
     btDynamicsWorld& world_;
-    std::vector<State> before_;           ///< of the world's objects, in its order; only active bodies have a velocity
+    StatesBefore<Velocity> before_;       ///< only active bodies have a velocity
     std::map<Ground, float> edgeAngles_;  ///< those asked for in this step [rad]
 };
 
