@@ -142,10 +142,12 @@ class PointSweep {
         const bool startsInside = offset != glm::vec3(0);
         glm::vec3 from = transforms_.front()(inner) + offset;
         std::optional<SurfaceEntry> entered;
+        float stop = 0;  // where the body stops if the point that has entered gets too deep
         for (std::size_t i = 0; i + 1 < transforms_.size() && transforms_[i].time < first_.time; ++i) {
             const glm::vec3 to = transforms_[i + 1](inner) + offset;
             const glm::vec3 ahead = transforms_[i].rotated(outward);
-            if (!entered) {
+            const bool wasInside = entered.has_value();
+            if (!wasInside) {
                 entered = surface_.entry(from, to, smaller);
                 if (entered && leaves(ahead, *entered)) entered.reset();
             }
@@ -153,23 +155,40 @@ class PointSweep {
                 const auto depth = [&](const glm::vec3& at) {
                     return glm::dot(entered->position - at, entered->normal) + smaller;
                 };
-                const float before = depth(from), after = depth(to);
                 // where the point itself touches
                 const float touching = std::min(inward * glm::dot(ahead, entered->normal), 0.f) - shrunk;
+                const float after = depth(to);
+                if (!wasInside) {
+                    const float part = stopOn({glm::distance(from, to), depth(from), after}, touching, i == 0);
+                    stop = glm::mix(transforms_[i].time, transforms_[i + 1].time, part);
+                }
                 if (after > (startsInside ? maxDeepening * voxel_ : maxDepth * voxel_ + touching)) {
-                    const float length = glm::distance(from, to), entering = -before / (after - before);
-                    float part =
-                        std::max((touching - before) / (after - before), entering - maxReturn * voxel_ / length);
-                    // there is too little path to go back on: the body stops where the point enters
-                    if (i == 0 && part * length < minAdvance * voxel_) part = std::max(entering, 0.f);
-                    const float time = transforms_[i].time + part * (transforms_[i + 1].time - transforms_[i].time);
-                    first_ = {std::clamp(time, 0.f, first_.time), entered->position - offset, entered->normal};
+                    first_ = {std::min(stop, first_.time), entered->position - offset, entered->normal};
                     return;
                 }
                 if (after < 0) entered.reset();
             }
             from = to;
         }
+    }
+
+    /// The straight path of a test point between two moments.
+    struct Chord {
+        float length;
+        float before, after;  ///< depths at its ends
+    };
+
+    /// Where a body stops whose test point enters on a chord: where the point itself touches, if that is not far back.
+    /// Before the chord the path has another direction.
+    /// @param touching  depth of the test point there
+    float stopOn(const Chord& chord, float touching, bool isFirst) const {
+        const auto& [length, before, after] = chord;
+        if (!(after > before)) return 0;
+        const float entering = std::max(-before / (after - before), 0.f);
+        const float part = std::max((touching - before) / (after - before), entering - maxReturn * voxel_ / length);
+        // there is too little path to go back on: the body stops where the point enters
+        const bool isAtStart = isFirst && part * length < minAdvance * voxel_;
+        return std::clamp(isAtStart ? entering : part, 0.f, 1.f);
     }
 
     /// Whether a point passes an open surface with its body ahead of it.

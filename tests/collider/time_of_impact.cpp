@@ -233,6 +233,34 @@ TEST_CASE("Bodies that have passed a surface by less than a voxel move on along 
         }
 }
 
+TEST_CASE("A ball that rolls into the ground is stopped next to the place where it enters") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float radius = 0.1f, voxel = radius / 32;
+    const Mesh sphere = shapes::sphere(radius, 5);
+    const ContactShape ball(Collider(sphere, build(sphere, {.voxelSize = voxel})));
+    const TriangleSheet floor = squareSheet();
+    const PlacedShape grounds[] = {{ContactShape(colliderOf(shapes::box({3, 3, 1}))), {{0, 0, -1}}},
+                                   {ContactShape::box({9, 9, 1}), {{0, 0, -1}}},
+                                   {ContactShape::plane({0, 0, 1}, 0)},
+                                   {ContactShape::triangles(floor)}};
+    int found = 0;
+    for (int round = 0; round < 200; ++round) {
+        PlacedShape body{ball, {{0, 0, radius + voxel * float(random(-0.2, 0.2))}, randomRotation(random)}};
+        const auto angle = float(random(0.2, 0.9));
+        body.motion = {{radius * angle, 0, -voxel * float(random(0.1, 0.8))}, {0, angle, 0}};
+        const Impact impact = timeOfImpact(body, grounds[round % 4], {.penetration = true});
+        if (!impact.found) continue;
+        ++found;
+        CAPTURE(round, angle, impact.fraction);
+        const float outside = glm::distance(impact.distance.b.position, impact.poseA.position) - radius;
+        CHECK(outside < 0.6f * voxel);
+        CHECK(outside > -0.4f * voxel);
+    }
+    CHECK(found > 20);
+}
+
 TEST_CASE("A body that slides towards a crease of triangles is stopped in front of it a few times at most") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
