@@ -30,9 +30,10 @@ glm::vec3 contactNormal(const Placed& other, const SurfaceSample& sample, const 
 }
 
 // A point's plane crosses an edge if the normal of the other surface changes from here to this far beyond by more than
-// 25 degrees (cosine) [voxels]. Samples are too smooth within a voxel of an edge. Elsewhere they are better than the
+// 25 degrees (cosine) [voxels]. Samples are too smooth within a voxel of an edge, which is 1.4 voxels from a corner. A
+// voxel above the surface, the normal changes by 25 degrees half a voxel later. Elsewhere samples are better than the
 // normals of facets.
-constexpr float beyondEdge = 1.5f, sharpCosine = 0.9f;
+constexpr float beyondEdge = 2, sharpCosine = 0.9f;
 
 // The outward normals of a body's surface near places in the world; zero where they are unknown.
 class NormalsNear {
