@@ -218,18 +218,22 @@ TEST_CASE("child processes start while other threads are busy") {
 TEST_CASE("child processes start while other threads register exit handlers") {
     if (test::isSanitized()) return;
     std::atomic<bool> stop = false;
+    // with pauses: a large process forks so slowly that each fork would meet a handler
     std::thread registering([&] {
-        while (!stop) {
-            std::at_quick_exit([] {});
-            std::this_thread::sleep_for(100us);
+        for (int burst = 0; burst < 20; ++burst) {
+            for (int i = 0; i < 100; ++i) {
+                std::at_quick_exit([] {});
+                std::this_thread::sleep_for(100us);
+            }
+            std::this_thread::sleep_for(50ms);
         }
+        stop = true;
     });
     const auto answer = [](const ChildProcess::Send& send) {
         std::at_quick_exit([] {});
         send("x", 1);
     };
-    for (int i = 0; i < 100; ++i) CHECK(failureOf(answer) == "an answer");
-    stop = true;
+    while (!stop) CHECK(failureOf(answer) == "an answer");
     registering.join();
     CHECK(hasNoChildren());
 }
