@@ -11,6 +11,7 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/support/drops.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -144,6 +145,45 @@ TEST_CASE("A body is stopped on the path that it took, whatever changes its velo
         CHECK(std::max(std::abs(at.x()), std::abs(at.y())) < 0.2f);
         world.dynamics.removeAction(&kick);
     }
+}
+
+TEST_CASE("Flat bodies that tumble over waves of triangles gain no energy where they are stopped") {
+    const unsigned seed = test::seed();
+    Random random(seed);
+    Shape plate(exactBox({0.3f, 0.3f, 0.03f}, 0.0125f)), box(exactBox({0.3f, 0.2f, 0.15f}, 0.0125f));
+    const std::vector<Ground> all = grounds();
+    // at the middle of a step, where the velocity at its end belongs: constant in free flight
+    const auto energy = [](const btRigidBody& body) {
+        const btVector3 &linear = body.getLinearVelocity(), &angular = body.getAngularVelocity();
+        const float height = body.getCenterOfMassPosition().z() - 0.5f * step * linear.z();
+        return 9.81 * double(height) + 0.5 * double(linear.length2()) +
+               0.5 * double(angular.dot(body.getInvInertiaTensorWorld().inverse() * angular));
+    };
+    int stopped = 0;
+    for (int drop = 0; drop < 80; ++drop) {
+        World world;
+        const WorldExtensions guard(world.dynamics);
+        world.add(*all[std::size_t(3 + drop % 2)].shape, 0, {0, 0, 0});
+        Shape& shape = drop / 2 % 2 == 0 ? plate : box;
+        const btQuaternion turned(bullet::detail::toBullet(random.direction()), float(random(0, 3)));
+        btRigidBody* body = world.add(shape, 1, {float(random(-0.3, 0.3)), float(random(-0.3, 0.3)), 0.45f}, turned);
+        body->setLinearVelocity(float(random(0, 6)) * bullet::detail::toBullet(random.direction()));
+        body->setAngularVelocity(float(random(0, 30)) * bullet::detail::toBullet(random.direction()));
+        body->setFlags(body->getFlags() & ~BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY);
+        const double before = energy(*body);
+        double least = before, gain = 0;
+        for (int i = 0; i < 90; ++i) {
+            world.dynamics.stepSimulation(step, 0);
+            stopped += guard.stoppedBodies();
+            const btVector3 at = body->getCenterOfMassPosition();
+            if (std::max(std::abs(at.x()), std::abs(at.y())) > 1) break;
+            least = std::min(least, energy(*body));
+            gain = std::max(gain, energy(*body) - least);
+        }
+        CAPTURE(seed, drop, all[std::size_t(3 + drop % 2)].name, before, gain);
+        CHECK(gain < 0.02 * before);
+    }
+    CHECK(stopped > 20);
 }
 
 TEST_CASE("A body stopped by a wall is not overrun by the next body") {

@@ -3,9 +3,11 @@
 
 #include <BulletCollision/CollisionShapes/btCollisionShape.h>
 
+#include <algorithm>
 #include <glm/common.hpp>
 
 #include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/velocity.h"
 
 namespace bilayer::bullet::detail {
 
@@ -49,6 +51,12 @@ bool BodySweep::apply() const {
     const Pose pose = sweep_.at(1);
     body_->setCenterOfMassTransform(btTransform(toBullet(pose.rotation), toBullet(pose.position)));
     return true;
+}
+
+void BodySweep::endForces(float seconds) const {
+    const btVector3 velocity = body_->getLinearVelocity(), added = (1 - stopTime()) * seconds * accelerationOf(object_);
+    const float along = added.dot(velocity);
+    if (along > 0) body_->setLinearVelocity(velocity - std::min(along / added.length2(), 1.f) * added);
 }
 
 }  // namespace bilayer::bullet::detail

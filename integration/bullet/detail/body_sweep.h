@@ -40,6 +40,9 @@ class BodySweep {
     bool stopAt(float time);
     /// Moves the body to the pose where it is stopped. Returns whether it is stopped.
     bool apply() const;
+    /// Takes back the speed that forces have added to a stopped body in the rest of a step of this length, in which it
+    /// has not moved. Otherwise a body that is stopped again and again falls faster without falling.
+    void endForces(float seconds) const;
 
   private:
     btCollisionObject& object_;

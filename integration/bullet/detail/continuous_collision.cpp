@@ -187,8 +187,13 @@ class SweptPairs {
     /// @param before  the pairs of the last step; replaced by those of this one
     int apply(std::vector<StoppedPair>& before) const {
         int stopped = 0;
-        for (const BodySweep& sweep : fast_) stopped += sweep.apply();
-        for (const auto& [object, sweep] : slow_) stopped += sweep.apply();
+        const auto stop = [&](const BodySweep& sweep) {
+            if (!sweep.apply()) return;
+            sweep.endForces(seconds_);
+            ++stopped;
+        };
+        for (const BodySweep& sweep : fast_) stop(sweep);
+        for (const auto& [object, sweep] : slow_) stop(sweep);
         std::vector<StoppedPair> stoppedPairs;
         for (const SweptPair& pair : pairs_) {
             if (!pair.isStopped()) continue;
