@@ -18,9 +18,10 @@ struct ExtensionOptions {
     /// The Dispatcher makes speculative contacts along each body's motion. But Bullet's solver is iterative, and an
     /// impact can send a fast body along a different path, by far more than the thickness of a plate. So the path of
     /// each fast body in a step, rotation included, is checked at the end of the step against everything that it swept
-    /// over. Where it would cross a surface, the body stays at the point of impact for the rest of the step. It keeps
-    /// its velocity, and its contacts there belong to the next step. If two bodies hold each other back in two
-    /// successive steps, they lose their approach velocity. Bodies that cannot move at all come to rest.
+    /// over. Where it would cross a surface, the body stays at the point of impact for the rest of the step, in which
+    /// its weight adds no speed. It keeps its velocity, and its contacts there belong to the next step. If two bodies
+    /// hold each other back in two successive steps, they lose their approach velocity. Bodies that cannot move at all
+    /// come to rest.
     ///
     /// Bodies that move less than a margin in a step cost almost nothing. The results are the same bits for any number
     /// of threads. Not handled are:

@@ -37,7 +37,8 @@ inline Mask getBits(const BlockMask& bits, int voxel) {
 void sortVoxels(const float* distances, const BandWidths& widths, BlockMask& unknown, BlockMask& inside,
                 BlockMask& band) {
     const Tag tag;
-    const auto size = hn::Set(tag, widths.voxelSize), highest = hn::Set(tag, edgeOfBand(widths.exterior, widths.voxelSize)),
+    const auto size = hn::Set(tag, widths.voxelSize),
+               highest = hn::Set(tag, edgeOfBand(widths.exterior, widths.voxelSize)),
                lowest = hn::Set(tag, -edgeOfBand(widths.interior, widths.voxelSize));
     unknown = inside = band = {};
     for (int i = 0; i < blockVoxels; i += int(hn::Lanes(tag))) {

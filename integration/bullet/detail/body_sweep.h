@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The sweep of an object over a step that has ended.
-// Tested by tests/bullet/continuous_collision.cpp through WorldExtensions.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>

@@ -129,9 +129,8 @@ float FacetFriction::loss(float angle) const {
 }
 
 void SmoothGround::beforeStep() {
-    before_.record(world_, [](btCollisionObject& object) {
-        return activeDynamicBody(object) ? velocityOf(object) : Velocity{};
-    });
+    before_.record(
+        world_, [](btCollisionObject& object) { return activeDynamicBody(object) ? velocityOf(object) : Velocity{}; });
 }
 
 float SmoothGround::edgeAngleUnder(const Ground& ground) {
