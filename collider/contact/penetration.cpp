@@ -36,6 +36,10 @@ constexpr float maxReturn = 0.5f;
 // A body that goes back to less than this from its start stops where the test point enters [voxels]. At its start,
 // contacts would miss the surface ahead, and it would be stopped there in each step.
 constexpr float minAdvance = 0.05f;
+// Beyond a convex edge, the surface is below the plane where a point entered. A point that is less than the first value
+// below the plane is as deep as the nearest surface above or below it says, if that is less than the first value away
+// and faces the same way (cosine) [voxels].
+constexpr float maxPlaneDepth = 1, minSimilarCosine = 0.5f;
 // An open surface that cuts a body up to this far below a test point has been passed by the point [voxels].
 constexpr float maxPassedDepth = 1;
 // ... where the body is thick enough: down there its surface is at least this far away. Otherwise the surface may just
@@ -152,43 +156,61 @@ class PointSweep {
                 if (entered && leaves(ahead, *entered)) entered.reset();
             }
             if (entered) {
-                const auto depth = [&](const glm::vec3& at) {
-                    return glm::dot(entered->position - at, entered->normal) + smaller;
-                };
-                // where the point itself touches
-                const float touching = std::min(inward * glm::dot(ahead, entered->normal), 0.f) - shrunk;
-                const float after = depth(to);
-                if (!wasInside) {
-                    const float part = stopOn({glm::distance(from, to), depth(from), after}, touching, i == 0);
-                    stop = glm::mix(transforms_[i].time, transforms_[i + 1].time, part);
+                // where the point itself touches, and where it is too deep
+                const float touching = std::min(inward * glm::dot(ahead, entered->normal), 0.f) - shrunk,
+                            limit = startsInside ? maxDeepening * voxel_ : maxDepth * voxel_ + touching;
+                const Chord chord{glm::distance(from, to), depthBelow(*entered, from, smaller),
+                                  depthBelow(*entered, to, smaller)};
+                if (!wasInside)
+                    stop =
+                        glm::mix(transforms_[i].time, transforms_[i + 1].time, stoppingPart(chord, touching, i == 0));
+                if (chord.after > limit) {
+                    const auto around = surfaceAround(to, chord.after, *entered, smaller);
+                    if (!around || depthBelow(*around, to, smaller) > limit) {
+                        first_ = {std::min(stop, first_.time), entered->position - offset, entered->normal};
+                        return;
+                    }
+                    entered = around;
                 }
-                if (after > (startsInside ? maxDeepening * voxel_ : maxDepth * voxel_ + touching)) {
-                    first_ = {std::min(stop, first_.time), entered->position - offset, entered->normal};
-                    return;
-                }
-                if (after < 0) entered.reset();
+                if (depthBelow(*entered, to, smaller) < 0) entered.reset();
             }
             from = to;
         }
+    }
+
+    /// How deep a sphere is below the tangent plane of the place where it entered.
+    static float depthBelow(const SurfaceEntry& entry, const glm::vec3& centre, float radius) {
+        return glm::dot(entry.position - centre, entry.normal) + radius;
     }
 
     /// The straight path of a test point between two moments.
     struct Chord {
         float length;
         float before, after;  ///< depths at its ends
+
+        /// Where it reaches a depth, as a fraction of its length; not limited to the chord.
+        float partAt(float depth) const { return after > before ? (depth - before) / (after - before) : 0; }
     };
 
-    /// Where a body stops whose test point enters on a chord: where the point itself touches, if that is not far back.
-    /// Before the chord the path has another direction.
+    /// Where on a chord a body stops whose test point enters on it: where the point itself touches, if that is not far
+    /// back. Before the chord the path has another direction.
     /// @param touching  depth of the test point there
-    float stopOn(const Chord& chord, float touching, bool isFirst) const {
-        const auto& [length, before, after] = chord;
-        if (!(after > before)) return 0;
-        const float entering = std::max(-before / (after - before), 0.f);
-        const float part = std::max((touching - before) / (after - before), entering - maxReturn * voxel_ / length);
+    float stoppingPart(const Chord& chord, float touching, bool isFirst) const {
+        const float entering = chord.partAt(0),
+                    part = std::max(chord.partAt(touching), entering - maxReturn * voxel_ / chord.length);
         // there is too little path to go back on: the body stops where the point enters
-        const bool isAtStart = isFirst && part * length < minAdvance * voxel_;
+        const bool isAtStart = isFirst && part * chord.length < minAdvance * voxel_;
         return std::clamp(isAtStart ? entering : part, 0.f, 1.f);
+    }
+
+    /// The surface around a point that is below the plane of its entry; nothing if that is unknown.
+    std::optional<SurfaceEntry> surfaceAround(const glm::vec3& point, float depth, const SurfaceEntry& plane,
+                                              float radius) const {
+        const float reach = maxPlaneDepth * voxel_;
+        if (depth > reach) return std::nullopt;
+        const auto found = surface_.entry(point + (depth + reach) * plane.normal, point - reach * plane.normal, radius);
+        if (!found || glm::dot(found->normal, plane.normal) < minSimilarCosine) return std::nullopt;
+        return found;
     }
 
     /// Whether a point passes an open surface with its body ahead of it.

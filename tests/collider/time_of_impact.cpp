@@ -294,4 +294,31 @@ TEST_CASE("A body that slides towards a crease of triangles is stopped in front 
         CHECK(stops <= 3);
     }
 }
+TEST_CASE("A body that slides over a ridge of triangles is not stopped by the plane of the slope behind it") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float half = 0.3f;
+    const Collider block = colliderOf(shapes::box({half, half, half}));
+    const float voxel = block.field().voxelSize();
+    for (int round = 0; round < 200; ++round) {
+        // a slope for negative x, flat for positive x
+        const auto slope = float(random(0.02, 0.12));
+        const Triangle triangles[] = {{glm::vec3(-9, -9, -9 * slope), {0, -9, 0}, {0, 9, 0}},
+                                      {glm::vec3(-9, -9, -9 * slope), {0, 9, 0}, {-9, 9, -9 * slope}},
+                                      {glm::vec3(0, -9, 0), {9, -9, 0}, {9, 9, 0}},
+                                      {glm::vec3(0, -9, 0), {9, 9, 0}, {0, 9, 0}}};
+        const TriangleSheet sheet{[&](const Bounds&, const TriangleSheet::Visitor& visitor) {
+            for (std::uint64_t i = 0; i < 4; ++i) visitor(triangles[i], i);
+        }};
+        const glm::quat rotation = randomRotation(random);
+        const PlacedShape ground{ContactShape::triangles(sheet), {{0, 0, 0}, rotation}};
+        PlacedShape body{ContactShape(block), {{0, 0, 0}, rotation}};
+        const auto depth = float(random(0.19, 0.24)), start = float(random(0.2, 3)), way = float(random(4, 7));
+        body.pose.position = rotation * glm::vec3(-half - start * voxel, 0, half - depth * voxel);
+        body.motion.displacement = rotation * glm::vec3(way * voxel, 0, 0);
+        CAPTURE(round, slope, depth, start, way);
+        CHECK_FALSE(timeOfImpact(body, ground, {.penetration = true}).found);
+    }
+}
 }  // namespace bilayer::time_of_impact_test
