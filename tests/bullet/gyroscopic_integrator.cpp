@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 #include <stdexcept>
 
+#include "demos/shared/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -16,6 +17,7 @@ using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::WorldExtensions;
+using demo::kineticEnergyOf;
 
 namespace {
 
@@ -24,10 +26,6 @@ constexpr bullet::ExtensionOptions gyroscopic{.continuousCollision = false, .gyr
 btVector3 momentumOf(const btRigidBody& body) {
     const btMatrix3x3& axes = body.getWorldTransform().getBasis();
     return axes * (axes.transpose() * body.getAngularVelocity() / body.getInvInertiaDiagLocal());
-}
-
-double energyOf(const btRigidBody& body) {
-    return 0.5 * double(momentumOf(body).dot(body.getAngularVelocity()));
 }
 
 // A brick in free space that spins about a principal axis or about two other axes.
@@ -54,11 +52,11 @@ TEST_CASE("Free bodies keep angular momentum and energy, however they spin") {
         Free free({spin.x, spin.y, spin.z});
         const WorldExtensions keeps(free.world.dynamics, gyroscopic);
         const btVector3 before = momentumOf(*free.body);
-        const double energy = energyOf(*free.body);
+        const double energy = kineticEnergyOf(*free.body);
         free.world.run(10);
         CAPTURE(spin.x, spin.y, spin.z);
         CHECK((momentumOf(*free.body) - before).length() < 1e-3f * before.length());
-        CHECK(energyOf(*free.body) == Approx(energy).epsilon(5e-3));
+        CHECK(kineticEnergyOf(*free.body) == Approx(energy).epsilon(5e-3));
     }
 }
 

@@ -13,6 +13,7 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "demos/shared/waves.h"
+#include "demos/shared/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -230,11 +231,7 @@ Slide slide(btCollisionShape& ground, btCollisionShape& shape, float height, flo
     body->setActivationState(DISABLE_DEACTIVATION);
     body->setLinearVelocity({2, 0, 0});
     body->setLinearFactor({1, 0, 1});
-    const auto kinetic = [&] {
-        const btVector3 spin = body->getAngularVelocity();
-        const btMatrix3x3 inertia = body->getInvInertiaTensorWorld().inverse();
-        return 0.5f * float(body->getLinearVelocity().length2() + spin.dot(inertia * spin));
-    };
+    const auto kinetic = [&] { return float(demo::kineticEnergyOf(*body)); };
     const auto energy = [&] { return kinetic() + 9.81f * float(body->getCenterOfMassPosition().z()); };
     Slide slide;
     for (int i = 0; float(i) < seconds * steps; ++i) {

@@ -11,6 +11,7 @@
 #include "collider/contact/smooth_edge_angle.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/waves.h"
+#include "demos/shared/world.h"
 #include "integration/bullet/detail/smooth_ground.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -22,16 +23,11 @@ using bullet::Shape;
 using bullet::WorldExtensions;
 using bullet::detail::FacetFriction;
 using bullet::detail::FacetImpact;
+using demo::kineticEnergyOf;
 
 namespace {
 
 constexpr float gravity = 9.81f, voxel = 0.0125f;  // [m/s^2], [m]
-
-double kineticEnergyOf(const btRigidBody& body) {
-    const btVector3 spin = body.getAngularVelocity();
-    const btMatrix3x3 inertia = body.getInvInertiaTensorWorld().inverse();
-    return 0.5 * double(body.getLinearVelocity().length2() + spin.dot(inertia * spin));
-}
 
 /// A body of 1 kg that moves over ground without friction, along x.
 struct Slider {

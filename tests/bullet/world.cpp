@@ -12,6 +12,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
+#include "demos/shared/world.h"
 #include "integration/bullet/detail/convert.h"
 #include "sdf/base/openvdb.h"
 
@@ -45,6 +46,11 @@ btRigidBody* World::add(btCollisionShape& shape, float mass, const btVector3& po
 void World::run(float seconds) {
     const float step = 1.f / 240;
     for (int i = 0; i < std::lround(seconds / step); ++i) dynamics.stepSimulation(step, 1, step);
+}
+
+double energyOf(const btRigidBody& body, float seconds) {
+    const float height = body.getCenterOfMassPosition().z() - 0.5f * seconds * body.getLinearVelocity().z();
+    return demo::kineticEnergyOf(body) + 9.81 * double(height) / double(body.getInvMass());
 }
 
 std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::function<float(const glm::vec3&)>& distance,

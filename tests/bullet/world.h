@@ -44,6 +44,11 @@ class World {
     std::vector<std::unique_ptr<btRigidBody>> bodies_;
 };
 
+/// Returns the kinetic and potential energy of a dynamic body in the middle of the last step, where the velocity at its
+/// end belongs: constant in free flight [J].
+/// @param seconds  length of the step
+double energyOf(const btRigidBody& body, float seconds);
+
 /// A field with the distances of a formula, not of the mesh's triangles. Remaining errors are those of the contacts.
 std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::function<float(const glm::vec3&)>& distance,
                                               float voxelSize);

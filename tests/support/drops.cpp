@@ -77,15 +77,6 @@ std::shared_ptr<btCollisionShape> wavyHeightField() {
     return shape;
 }
 
-// Kinetic and potential [J].
-double energyOf(const btRigidBody& body) {
-    const btVector3 spin = body.getAngularVelocity();
-    return (gravity * double(body.getWorldTransform().getOrigin().z()) +
-            0.5 * double(body.getLinearVelocity().length2())) /
-               double(body.getInvMass()) +
-           0.5 * double(spin.dot(body.getInvInertiaTensorWorld().inverse() * spin));
-}
-
 int contactsAside(btDispatcher& dispatcher, const btRigidBody& body) {
     int count = 0;
     for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
@@ -124,11 +115,11 @@ Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& gro
     world.add(ground, 0, {0, 0, 0});
     const btTransform at = start(*collider, shape.frame(), place);
     const btRigidBody& body = *world.add(shape, 1, at.getOrigin(), at.getRotation());
-    double smallest = energyOf(body), gain = 0;
+    double smallest = energyOf(body, 1 / stepsPerSecond), gain = 0;
     Drop result;
     for (int step = 0; step < int(stepsPerSecond * seconds); ++step) {
         world.dynamics.stepSimulation(1 / stepsPerSecond, 1, 1 / stepsPerSecond);
-        const double now = energyOf(body);
+        const double now = energyOf(body, 1 / stepsPerSecond);
         if (!std::isfinite(now)) {
             result.gain = std::numeric_limits<double>::infinity();
             return result;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // States of a world's objects at the beginning of a step.
-// Tested by tests/bullet/continuous_collision.cpp through WorldExtensions.
+// Tested by tests/bullet/body_sweep.cpp through WorldExtensions.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
