@@ -34,6 +34,9 @@ namespace {
 constexpr int maxRounds = 256;
 // A body stopped this early in a step counts as not moved.
 constexpr float atStart = 1e-3f;
+// Bodies that have not moved in this many successive steps lose their velocity. In each of the steps they lose the
+// approach velocity in one place: a body that touches in several places may then be free to move on.
+constexpr int maxStepsAtStart = 3;
 
 /// A shape other than a compound, and its pose in its object.
 struct LeafShape {
@@ -108,7 +111,7 @@ struct SweptPair {
     bool hasNotMoved() const { return stop.time <= atStart; }
     StoppedPair stopped() const {
         const auto [first, second] = std::minmax(&a->object(), &b->object());
-        return {first, second, !hasNotMoved()};
+        return {first, second, hasNotMoved() ? 1 : 0};
     }
 
     /// Sets the velocity of bodies that do not move to zero.
@@ -183,7 +186,7 @@ class SweptPairs {
 
     /// Moves the bodies to the poses where they are stopped. Two bodies that stop each other in two successive steps,
     /// or that have not moved, lose the approach velocity that this step's contacts have left. If they have not moved
-    /// in two successive steps, they lose all of their velocity, which would otherwise grow with each step.
+    /// in three successive steps, they lose all of their velocity, which would otherwise grow with each step.
     /// @param before  the pairs of the last step; replaced by those of this one
     int apply(std::vector<StoppedPair>& before) const {
         int stopped = 0;
@@ -197,12 +200,13 @@ class SweptPairs {
         std::vector<StoppedPair> stoppedPairs;
         for (const SweptPair& pair : pairs_) {
             if (!pair.isStopped()) continue;
-            const StoppedPair& now = stoppedPairs.emplace_back(pair.stopped());
+            StoppedPair& now = stoppedPairs.emplace_back(pair.stopped());
             const auto last = std::find_if(before.begin(), before.end(),
                                            [&](const StoppedPair& one) { return one.isOfSameObjects(now); });
             const bool isAgain = last != before.end();
-            if (isAgain || !now.hasMoved) pair.removeApproachVelocity();
-            if (isAgain && !last->hasMoved && !now.hasMoved) pair.removeVelocity();
+            if (isAgain && now.stepsAtStart) now.stepsAtStart += last->stepsAtStart;
+            if (isAgain || now.stepsAtStart) pair.removeApproachVelocity();
+            if (now.stepsAtStart >= maxStepsAtStart) pair.removeVelocity();
         }
         before = std::move(stoppedPairs);
         return stopped;

@@ -28,7 +28,7 @@ class RecentlyFastBodies {
 /// Two objects; one was stopped where it met the other.
 struct StoppedPair {
     const btCollisionObject *first, *second;
-    bool hasMoved;  ///< before it was stopped
+    int stepsAtStart;  ///< for how many steps in a row they have not moved before they were stopped
 
     bool isOfSameObjects(const StoppedPair& other) const { return first == other.first && second == other.second; }
 };
