@@ -161,9 +161,10 @@ class PointSweep {
                             limit = startsInside ? maxDeepening * voxel_ : maxDepth * voxel_ + touching;
                 const Chord chord{glm::distance(from, to), depthBelow(*entered, from, smaller),
                                   depthBelow(*entered, to, smaller)};
-                if (!wasInside)
-                    stop =
-                        glm::mix(transforms_[i].time, transforms_[i + 1].time, stoppingPart(chord, touching, i == 0));
+                if (!wasInside) {
+                    const float part = stoppingPart(chord, touching, i == 0);
+                    stop = glm::mix(transforms_[i].time, transforms_[i + 1].time, part);
+                }
                 if (chord.after > limit) {
                     const auto around = surfaceAround(to, chord.after, *entered, smaller);
                     if (!around || depthBelow(*around, to, smaller) > limit) {

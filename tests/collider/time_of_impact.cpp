@@ -3,6 +3,7 @@
 // triangles in double precision.
 #define GLM_ENABLE_EXPERIMENTAL  // for the rotation between two vectors
 #include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -44,6 +45,18 @@ TriangleSheet squareSheet() {
         if (box.lower.z > 0 || box.upper.z < 0) return;
         visitor({glm::vec3(-9, -9, 0), {9, -9, 0}, {9, 9, 0}}, 0);
         visitor({glm::vec3(-9, -9, 0), {9, 9, 0}, {-9, 9, 0}}, 1);
+    }};
+}
+
+/// Two rectangles that meet at x = 0 and z = 0.
+/// @param left, right  heights at x = -9 and x = 9
+TriangleSheet bentSheet(float left, float right) {
+    const std::array<Triangle, 4> triangles{Triangle{glm::vec3(-9, -9, left), {0, -9, 0}, {0, 9, 0}},
+                                            {glm::vec3(-9, -9, left), {0, 9, 0}, {-9, 9, left}},
+                                            {glm::vec3(0, -9, 0), {9, -9, right}, {9, 9, right}},
+                                            {glm::vec3(0, -9, 0), {9, 9, right}, {0, 9, 0}}};
+    return {[=](const Bounds&, const TriangleSheet::Visitor& visitor) {
+        for (std::uint64_t i = 0; i < 4; ++i) visitor(triangles[i], i);
     }};
 }
 
@@ -271,13 +284,7 @@ TEST_CASE("A body that slides towards a crease of triangles is stopped in front 
     for (int round = 0; round < 200; ++round) {
         // flat for negative x, a slope for positive x
         const float rise = 9 * std::tan(float(random(0.1, 0.4)));
-        const Triangle triangles[] = {{glm::vec3(-9, -9, 0), {0, -9, 0}, {0, 9, 0}},
-                                      {glm::vec3(-9, -9, 0), {0, 9, 0}, {-9, 9, 0}},
-                                      {glm::vec3(0, -9, 0), {9, -9, rise}, {9, 9, rise}},
-                                      {glm::vec3(0, -9, 0), {9, 9, rise}, {0, 9, 0}}};
-        const TriangleSheet sheet{[&](const Bounds&, const TriangleSheet::Visitor& visitor) {
-            for (std::uint64_t i = 0; i < 4; ++i) visitor(triangles[i], i);
-        }};
+        const TriangleSheet sheet = bentSheet(0, rise);
         const PlacedShape ground{ContactShape::triangles(sheet)};
         PlacedShape body{ContactShape(block)};
         const float depth = float(random(0, 0.8)), height = float(random(0, 0.2));
@@ -294,6 +301,7 @@ TEST_CASE("A body that slides towards a crease of triangles is stopped in front 
         CHECK(stops <= 3);
     }
 }
+
 TEST_CASE("A body that slides over a ridge of triangles is not stopped by the plane of the slope behind it") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
@@ -304,13 +312,7 @@ TEST_CASE("A body that slides over a ridge of triangles is not stopped by the pl
     for (int round = 0; round < 200; ++round) {
         // a slope for negative x, flat for positive x
         const auto slope = float(random(0.02, 0.12));
-        const Triangle triangles[] = {{glm::vec3(-9, -9, -9 * slope), {0, -9, 0}, {0, 9, 0}},
-                                      {glm::vec3(-9, -9, -9 * slope), {0, 9, 0}, {-9, 9, -9 * slope}},
-                                      {glm::vec3(0, -9, 0), {9, -9, 0}, {9, 9, 0}},
-                                      {glm::vec3(0, -9, 0), {9, 9, 0}, {0, 9, 0}}};
-        const TriangleSheet sheet{[&](const Bounds&, const TriangleSheet::Visitor& visitor) {
-            for (std::uint64_t i = 0; i < 4; ++i) visitor(triangles[i], i);
-        }};
+        const TriangleSheet sheet = bentSheet(-9 * slope, 0);
         const glm::quat rotation = randomRotation(random);
         const PlacedShape ground{ContactShape::triangles(sheet), {{0, 0, 0}, rotation}};
         PlacedShape body{ContactShape(block), {{0, 0, 0}, rotation}};

@@ -108,10 +108,9 @@ struct SweptPair {
     }
 
     bool isStopped() const { return stop.found(); }
-    bool hasNotMoved() const { return stop.time <= atStart; }
     StoppedPair stopped() const {
         const auto [first, second] = std::minmax(&a->object(), &b->object());
-        return {first, second, hasNotMoved() ? 1 : 0};
+        return {first, second, stop.time <= atStart ? 1 : 0};
     }
 
     /// Sets the velocity of bodies that do not move to zero.
