@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""usage: contact_pictures.py: draws pictures of contacts: docs/patch.svg, docs/sweep.svg, docs/shapes.svg and docs/blocks_of_a_body.svg
-of what the Python module finds, docs/smooth_ground.svg of runs of ./run demo terrain.
+"""usage: contact_pictures.py: draws pictures of contacts: docs/patch.svg, docs/normals.svg, docs/sweep.svg, docs/shapes.svg and
+docs/blocks_of_a_body.svg of what the Python module finds, docs/smooth_ground.svg of runs of ./run demo terrain.
 
 Needs ./run python, ./run build demo_terrain and Debian's package glmark2-data; run it with PYTHONPATH=build/release/python."""
 
@@ -42,6 +42,30 @@ def patch():
     svg("patch.svg", 600, 450, [f'<circle cx="{300 + x:.0f}" cy="{225 + z:.0f}" r="6.5" fill="{GROUND}"/>' for x, z in shadow] +
         dots(found[0], 2.5, GREY) + dots(found[1], 5, RED) +
         [label(20, 30, f"a bunny on a floor, from above: {len(found[0])} contacts,"), label(20, 50, f"of which {len(found[1])} are kept", RED)])
+
+
+def normals():
+    """A box whose corner has sunk into the edge of another box: contacts by the nearest surface alone, and those that count."""
+    def body(size):
+        mesh = bilayer.box(size)
+        return bilayer.Collider(mesh, bilayer.build(mesh, voxel_size=0.05, half_width_voxels=5))
+
+    ground, box, angle = body((2, 1, 1)), body((0.8, 0.5, 0.8)), 0.3
+    pose = bilayer.Pose((0.95, 0.70, 0), (np.cos(angle / 2), 0, 0, np.sin(angle / 2)))
+    found = [bilayer.collide(box, pose, ground, None, margin=0.05, min_normal_cosine=cosine, min_normal_cosine_apart=apart,
+                             keep_oblique_edges=cosine < 0) for cosine, apart in ((-2, -2), (0.3, 0.9))]
+
+    def arrows(contacts, colour):
+        seen = {(round(x, 2), round(y, 2), round(nx, 2), round(ny, 2)) for (x, y, _), (nx, ny, nz)
+                in zip(contacts.position, contacts.normal) if abs(nz) < 0.5}
+        return [f'<path d="M{x} {y}l{0.12 * nx:.3f} {0.12 * ny:.3f}" stroke="{colour}" stroke-width=".008"/>'
+                f'<circle cx="{x}" cy="{y}" r=".014" fill="{colour}"/>' for x, y, nx, ny in sorted(seen)]
+
+    svg("normals.svg", 600, 330, ['<g transform="translate(130 330) scale(280 -280)">',
+        f'<rect x="-1" y="-.5" width="2" height="1" fill="{GROUND}" stroke="{DARK}" stroke-width=".007"/>',
+        f'<g transform="translate(.95 .7) rotate({np.degrees(angle):.1f})"><rect x="-.4" y="-.25" width=".8" height=".5" fill="{BODY}" '
+        'fill-opacity=".7" stroke="#b5651d" stroke-width=".007"/></g>', *arrows(found[0], GREY), *arrows(found[1], RED), "</g>",
+        label(20, 30, "normals of the nearest surface: left out", "#6d8498"), label(20, 50, "normals of contacts that count", RED)])
 
 
 def sweep():
@@ -177,6 +201,7 @@ def smooth_ground():
 
 if __name__ == "__main__":
     patch()
+    normals()
     sweep()
     shapes()
     blocks_of_a_body()

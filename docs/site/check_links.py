@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""usage: check_links.py DIR: checks every link of a web site to its own pages, their anchors and files, and that no page
-loads anything from elsewhere."""
+"""usage: check_links.py DIR: checks every link of a web site to its own pages, their anchors and files, and that no page or style
+sheet loads anything from elsewhere, and no script another one."""
 
+import re
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -25,7 +26,21 @@ class Page(HTMLParser):
             self.loaded.append(attributes[LOADED[tag]])
 
 
+def loaded_by_others(folder):
+    """What style sheets and scripts load: (file, address)."""
+    for path in folder.rglob("*.css"):
+        for address in re.findall(r"""(?:@import\s+(?:url\()?|url\()["']?([^"')\s;]+)""", path.read_text()):
+            if not address.startswith("data:"):
+                yield path, address
+    for path in folder.rglob("*.js"):
+        for address in re.findall(r"""^import\b.*?["'](.+?)["']""", path.read_text(), re.M):
+            yield path, address
+
+
 def faults(folder):
+    for path, address in loaded_by_others(folder):
+        if path.suffix == ".js" or not (path.parent / address).is_file():
+            yield f"{path.name} loads {address}"
     pages = {path.resolve(): Page(path) for path in folder.rglob("*.html")}
     for path, page in pages.items():
         for link in page.links + page.loaded:

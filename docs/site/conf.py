@@ -130,11 +130,22 @@ def add_to_page(app, name, source):
         source[0] += "".join(reference(folder.group(1)))
 
 
-def add_index(app, error):
+def complete_theme(static):
+    """Makes Debian's Furo work from a folder: its style sheet imports a file of a web server, and its script is a module, which
+    browsers do not load from files."""
+    scripts, sheet = static / "scripts", static / "styles" / "furo.css"
+    shutil.copy("/usr/share/javascript/normalize.css/normalize.css", static / "styles")
+    sheet.write_text(sheet.read_text().replace("/javascript/normalize.css/", ""))
+    furo = (scripts / "furo.js").read_text().replace('import Gumshoe from "./gumshoe-patched.js";', "")
+    (scripts / "furo.js").write_text((scripts / "gumshoe-patched.js").read_text() + furo)
+
+
+def finish(app, error):
     if error is None:
+        complete_theme(Path(app.outdir) / "_static")
         shutil.copy(Path(app.outdir) / "README.html", Path(app.outdir) / "index.html")
 
 
 def setup(app):
     app.connect("source-read", add_to_page)
-    app.connect("build-finished", add_index)
+    app.connect("build-finished", finish)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """usage: error_texts.py SOURCE: checks that the sources have the messages that docs/errors.md lists, and the metadata that
-docs/metadata.md lists are those that the sources name."""
+docs/metadata.md lists are those that the sources name, with the version that they write."""
 
 import re
 import sys
@@ -29,11 +29,18 @@ def other_metadata(page, code):
            [f"docs/metadata.md does not list {name}" for name in sorted(named - listed)]
 
 
+def other_version(page, source):
+    shown, written = re.search(r"the version of these entries: (\d+)", page), re.search(r"int32_t format = (\d+);", source)
+    if shown.group(1) != written.group(1):
+        yield f"docs/metadata.md: entries of bodies have the version {shown.group(1)}, the sources write {written.group(1)}"
+
+
 def main():
     root = Path(sys.argv[1])
-    code = sources(root)
+    code, metadata = sources(root), (root / "docs" / "metadata.md").read_text()
     faults = [*missing_messages((root / "docs" / "errors.md").read_text(), code),
-              *other_metadata((root / "docs" / "metadata.md").read_text(), code)]
+              *other_metadata(metadata, code),
+              *other_version(metadata, (root / "collider" / "contact" / "body.cpp").read_text())]
     sys.exit("\n".join(faults) if faults else 0)
 
 

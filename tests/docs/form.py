@@ -13,7 +13,7 @@ MAX_ITEM, MAX_PARAGRAPH = 3, 6  # [lines]
 MAX_CELL = 40                   # [words]
 MAX_LINE = 130                  # of text; tables and pictures are wider
 GENERATED = ["python-reference.md", "command-line-options.md"]
-WITH_PICTURE = ["finding", "motion", "solver", "shapes", "extensions", "bullet-world"]
+WITH_PICTURE = ["finding", "normals", "motion", "solver", "shapes", "extensions", "smooth-ground", "bullet-world"]
 PICTURE = re.compile(r"!\[[^\]]+\]\(([\w./-]+)\)")
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 BLOCK = re.compile(r"(?:^<!-- given: (?P<given>[^\n]*?) -->\n+)?^```(?P<language>[\w-]*)\n(?P<text>.*?)^```$", re.M | re.S)
 NUMBER = re.compile(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
 # rows of times, memory and processors: only their presence is compared
-MEASURED = re.compile(r"^\s*(files|time|build|peak memory|filled by)\s.*$", re.M)
+MEASURED = re.compile(r"^\s*(files|time|build(?!\s+--)|peak memory|filled by)\s.*$", re.M)
 RELATIVE_TOLERANCE = 0.02  # numbers on a page hold for other processors too
 ROUNDING_STEPS = 2         # of the last digit printed
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""usage: run_page.py [--write] [--given FILE] [--from HEADING] [--until HEADING] [--packages DIR]
+"""usage: run_page.py [--write] [--given FILE[=NAME]] [--from HEADING] [--until HEADING] [--packages DIR]
 SOURCE BUILD SCRATCH PAGE
 
 Does what a page shows, in its order, in an empty folder: writes its files, runs its commands and its Python, and compares
@@ -10,7 +10,7 @@ Commands run as on a reader's machine, except for these, which tests/docs/stand-
 build`; `sudo apt`, which only looks; `sudo cmake --install`, which installs below SCRATCH.
 
 With --packages, in a clean root (tests/package/debian.sh), all commands are real but `./run`: its packages are in DIR.
---from leaves out what stands before a heading, --until that heading and what follows it.
+--given puts a file into the folder first. --from leaves out what stands before a heading, --until that heading and what follows it.
 """
 
 import argparse
@@ -30,7 +30,7 @@ END = "== end of output =="
 def parse():
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("--write", action="store_true")
-    parser.add_argument("--given", action="append", default=[], type=Path)
+    parser.add_argument("--given", action="append", default=[])
     parser.add_argument("--from", dest="heading")
     parser.add_argument("--until")
     parser.add_argument("--packages", type=Path)
@@ -106,11 +106,12 @@ def main():
     if options.packages:
         (folder / "build" / "packages").symlink_to(options.packages)
     (folder / "run").symlink_to(options.source / "tests" / "docs" / "stand-ins" / "run")
-    for file in options.given:
-        if not file.exists():
+    for given in options.given:
+        file, _, name = given.partition("=")
+        if not Path(file).exists():
             print(f"skipped: {file} is not here")
             return SKIPPED
-        shutil.copy(file, folder)
+        shutil.copy(file, folder / (name or Path(file).name))
 
     begin = page.index(f"## {options.heading}\n") if options.heading else 0
     end = page.index(f"## {options.until}\n") if options.until else None

@@ -19,7 +19,9 @@ options=()
 for file in /etc/apt/apt.conf.d/*proxy* /etc/apt/apt.conf.d/*registry*; do
   [[ ! -f $file ]] || options+=(--aptopt="$file")
 done
-mmdebstrap --variant=minbase --quiet "${options[@]}" bookworm "$root" || skip "mmdebstrap finds no Debian mirror"
+options+=(--variant=minbase --quiet bookworm)
+mmdebstrap --simulate "${options[@]}" "$root" || skip "mmdebstrap finds no Debian mirror"
+mmdebstrap "${options[@]}" "$root"
 
 mkdir -p "$root/packages" "$root/user" "$root/source/docs/start" "$root/source/tests"
 cp "$source/run" "$root/source/"
