@@ -15,7 +15,8 @@ def page(program):
     general = help_of(program)
     commands = re.findall(r"^  (\w+) ", general.split("Subcommands:\n")[1], re.M)
     parts = ["# Options of the command line\n",
-             "Written by `docs/command_line.py` from `bilayer --help`. [command-line.md](command-line.md) shows the commands at work.\n",
+             "Written by `docs/command_line.py` from `bilayer --help`. [command-line.md](command-line.md) shows the commands at work.\n"
+             "`bilayer-mpi build` has the options of `bilayer build` ([tiles](tiles.md)).\n",
              f"```\n{general}\n```\n"]
     parts += [f"## `bilayer {command}`\n\n```\n{help_of(program, command)}\n```\n" for command in commands]
     return "\n".join(parts)

@@ -39,7 +39,7 @@ bool isStill(const std::vector<Contact>& contacts, std::span<const ContactPatch>
 
 }  // namespace
 
-ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const ContactPatch> last) {
+ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const ContactPatch> last, float rotation) {
     std::stable_sort(contacts.begin(), contacts.end(),
                      [](const Contact& a, const Contact& b) { return a.remaining() < b.remaining(); });
     if (!isStill(contacts, last)) last = {};
@@ -52,7 +52,7 @@ ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const ContactPa
         std::vector<std::uint32_t> kept(group.size());
         std::iota(kept.begin(), kept.end(), 0u);
         if (group.size() > patchSize) {
-            FirstContacts first = firstContacts(contacts, group, lastContacts);
+            FirstContacts first = firstContacts(contacts, group, lastContacts, rotation);
             kept = std::move(first.kept);
             result.reductionError = std::max(result.reductionError, first.reductionError);
             minExtent = std::min(minExtent, extentOf(contacts, group));
@@ -68,9 +68,9 @@ ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const ContactPa
     return result;
 }
 
-void ContactReduction::update(std::vector<Contact>& contacts, const Pose& a, const Pose& b) {
+void ContactReduction::update(std::vector<Contact>& contacts, const Pose& a, const Pose& b, float rotation) {
     if (holds(a, b) && reuse(contacts)) return;
-    reduced_ = reduce(contacts, reduced_.patches);
+    reduced_ = reduce(contacts, reduced_.patches, rotation);
     kept_.clear();
     for (const ContactPatch& patch : reduced_.patches)
         for (int i = 0; i < patch.count; ++i) {
@@ -116,13 +116,14 @@ bool ContactReduction::reuse(const std::vector<Contact>& contacts) {
     return true;
 }
 
-void reduceFrom(std::size_t first, std::vector<Contact>& contacts, const Pose& a, const Pose& b, ContactCache* cache) {
+void reduceFrom(std::size_t first, std::vector<Contact>& contacts, const Pose& a, const Pose& b, float rotation,
+                ContactCache* cache) {
     const auto begin = contacts.begin() + std::ptrdiff_t(first);
     std::vector<Contact> found(begin, contacts.end());
     contacts.erase(begin, contacts.end());
     ContactReduction once;
     ContactReduction& reduction = cache ? cache->data().reduction : once;
-    reduction.update(found, a, b);
+    reduction.update(found, a, b, rotation);
     for (const ContactPatch& patch : reduction.reduced().patches)
         contacts.insert(contacts.end(), patch.contacts.begin(), patch.contacts.begin() + patch.count);
 }

@@ -43,17 +43,19 @@ struct ReducedContacts {
 ///
 /// Deterministic: depends only on the contacts, their order and `last`. If the last step had no patches, the patch of
 /// the deepest contact comes first. Reorders `contacts`.
-/// @param last  the patches of the same pair in the last step, or nothing. While the bodies hardly move, patches keep
-///              their places; among contacts that are nearly as good, those of the last step are kept again
-ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const ContactPatch> last = {});
+/// @param last      the patches of the same pair in the last step, or nothing. While the bodies hardly move, patches
+///                  keep their places; among contacts that are nearly as good, those of the last step are kept again
+/// @param rotation  angle by which the bodies rotate relative to each other in the step [rad]
+ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const ContactPatch> last = {}, float rotation = 0);
 
 /// The reduced contacts of one pair of bodies from step to step. They are chosen again only when the bodies have moved
 /// relative to each other since the last choice, which resting bodies rarely do.
 class ContactReduction {
   public:
     /// Reduces this step's contacts. Reorders `contacts`.
-    /// @param a, b  poses of the bodies
-    void update(std::vector<Contact>& contacts, const Pose& a, const Pose& b);
+    /// @param a, b      poses of the bodies
+    /// @param rotation  angle by which the bodies rotate relative to each other in the step [rad]
+    void update(std::vector<Contact>& contacts, const Pose& a, const Pose& b, float rotation);
 
     const ReducedContacts& reduced() const { return reduced_; }
 
@@ -71,8 +73,10 @@ class ContactReduction {
 };
 
 /// Replaces the contacts from number `first` on by the reduced ones (ContactOptions::reduced).
-/// @param a, b   poses of the bodies
-/// @param cache  null, or that of the pair
-void reduceFrom(std::size_t first, std::vector<Contact>& contacts, const Pose& a, const Pose& b, ContactCache* cache);
+/// @param a, b      poses of the bodies
+/// @param rotation  angle by which the bodies rotate relative to each other in the step [rad]
+/// @param cache     null, or that of the pair
+void reduceFrom(std::size_t first, std::vector<Contact>& contacts, const Pose& a, const Pose& b, float rotation,
+                ContactCache* cache);
 
 }  // namespace bilayer::detail

@@ -26,6 +26,9 @@ constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
 // Upper limit of an additional tilt, for steps that move a body farther: the rotation of a body whose other side is
 // stopped [rad].
 constexpr float maxStepRotation = 1;
+// The approach of contacts that touch counts while the bodies rotate by no more than this in the step: the approach is
+// that of straight paths [rad].
+constexpr float maxStraightRotation = 0.1f;
 constexpr float shiftSize = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float directionOffset = 0.3f;  // [rad]
@@ -83,7 +86,7 @@ glm::vec3 perpendicularTo(const glm::vec3& unit) {
 /// handle several contacts at once.
 class Separations {
   public:
-    Separations(const std::vector<Contact>& contacts, const ContactGroup& group)
+    Separations(const std::vector<Contact>& contacts, const ContactGroup& group, float rotation)
         : count_(group.size()), padded_((count_ + lanes - 1) / lanes * lanes), numbers_(columns * padded_, 0.f) {
         glm::vec3 normal(0), centre(0);
         for (const std::uint32_t i : group) normal += contacts[i].normal, centre += contacts[i].position;
@@ -93,18 +96,23 @@ class Separations {
         const glm::vec3 x = perpendicularTo(normal), y = glm::cross(normal, x);
         std::fill(column(gap) + count_, column(gap) + padded_, std::numeric_limits<float>::max());
         // An approaching contact is stopped where it touches. It gets no deeper than the contacts that touch already,
-        // which must bear their part of a body that comes down at an angle.
-        float first = 0, approach = 0;
+        // which must bear their part of a body that comes down at an angle. Those count with what they approach more
+        // than the others: a body that slides needs the contacts of the face that it moves on to.
+        float first = 0, approach = 0, common = std::numeric_limits<float>::max();
         for (const std::uint32_t i : group)
             if (contacts[i].distance > 0) {
                 first = std::min(first, contacts[i].remaining());
                 approach = std::max(approach, contacts[i].approach);
+            } else {
+                common = std::min(common, contacts[i].approach);
             }
         rotation_ = extent_ > 0 ? std::min(approach / extent_, maxStepRotation) : 0;
         for (std::size_t k = 0; k < count_; ++k) {
             const Contact& contact = contacts[group[k]];
             const glm::vec3 torque = glm::cross(contact.position - centre, contact.normal);
-            column(gap)[k] = contact.distance > 0 ? contact.remaining() - first : contact.distance;
+            column(gap)[k] = contact.distance > 0             ? contact.remaining() - first
+                             : rotation < maxStraightRotation ? contact.remaining() + common
+                                                              : contact.distance;
             column(tiltX)[k] = glm::dot(torque, x);
             column(tiltY)[k] = glm::dot(torque, y);
             column(shiftX)[k] = extent_ * glm::dot(contact.normal, x);
@@ -171,8 +179,8 @@ class Separations {
 /// The search of firstContacts().
 class FirstContactSearch {
   public:
-    FirstContactSearch(const std::vector<Contact>& contacts, const ContactGroup& group)
-        : separations_(contacts, group) {
+    FirstContactSearch(const std::vector<Contact>& contacts, const ContactGroup& group, float rotation)
+        : separations_(contacts, group, rotation) {
         static const std::vector<Perturbation> all = perturbations();
         perturbations_ = all;
         if (separations_.rotation() > tilts[0]) {
@@ -295,11 +303,12 @@ class FirstContactSearch {
 
 }  // namespace
 
-FirstContacts firstContacts(const std::vector<Contact>& contacts, const ContactGroup& group, const LastContacts& last) {
+FirstContacts firstContacts(const std::vector<Contact>& contacts, const ContactGroup& group, const LastContacts& last,
+                            float rotation) {
     std::vector<std::uint32_t> before;
     for (std::uint32_t k = 0; k < group.size(); ++k)
         if (last.kept(contacts[group[k]])) before.push_back(k);
-    FirstContactSearch search(contacts, group);
+    FirstContactSearch search(contacts, group, rotation);
     std::vector<std::uint32_t> kept = search.choose(before);
     return {std::move(kept), search.reductionError()};
 }

@@ -29,7 +29,9 @@ struct FirstContacts {
 
 /// Chooses the contacts of a group that some small motion of the bodies meets first. A contact of the last step stays
 /// while some motion meets it first within the tolerance: contacts that bear a load must not come and go.
-/// @param last  the contacts of the last step
-FirstContacts firstContacts(const std::vector<Contact>& contacts, const ContactGroup& group, const LastContacts& last);
+/// @param last      the contacts of the last step
+/// @param rotation  angle by which the bodies rotate relative to each other in the step [rad]
+FirstContacts firstContacts(const std::vector<Contact>& contacts, const ContactGroup& group, const LastContacts& last,
+                            float rotation);
 
 }  // namespace bilayer::detail

@@ -166,12 +166,11 @@ class PointSweep {
                     stop = glm::mix(transforms_[i].time, transforms_[i + 1].time, part);
                 }
                 if (chord.after > limit) {
-                    const auto around = surfaceAround(to, chord.after, *entered, smaller);
-                    if (!around || depthBelow(*around, to, smaller) > limit) {
+                    if (const auto around = surfaceAround(to, chord.after, *entered, smaller)) entered = around;
+                    if (depthBelow(*entered, to, smaller) > limit) {
                         first_ = {std::min(stop, first_.time), entered->position - offset, entered->normal};
                         return;
                     }
-                    entered = around;
                 }
                 if (depthBelow(*entered, to, smaller) < 0) entered.reset();
             }

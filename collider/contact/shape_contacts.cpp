@@ -107,7 +107,8 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
     if (order.isSwapped)
         for (std::size_t i = first; i < contacts.size(); ++i) contacts[i] = swappedContact(contacts[i]);
     removeInfinite(contacts, first);
-    if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, cache);
+    if (options.reduced)
+        reduceFrom(first, contacts, a.pose, b.pose, glm::length(a.motion.rotation - b.motion.rotation), cache);
     return report;
 }
 

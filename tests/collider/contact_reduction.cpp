@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <numeric>
 #include <random>
 #include <set>
@@ -15,6 +16,7 @@
 #include "collider/contact/contact_reduction.h"
 #include "collider/contact/first_contacts.h"
 #include "demos/shared/shapes.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 
 namespace bilayer::contact_reduction_test {
@@ -110,11 +112,44 @@ TEST_CASE("Contact reduction keeps load-bearing contacts while a body rocks on t
     CHECK(gone <= kept / 250);
 }
 
+TEST_CASE("Contact reduction keeps contacts on either side of the slope that a body slides on to") {
+    const unsigned start = seed();
+    Random random(start);
+    for (int patch = 0; patch < 200; ++patch) {
+        // slides along x, over a floor that rises from `foot` on; the contacts are rotated about z
+        const float slope = float(random(0.05, 0.3)), foot = float(random(0.05, 0.25));  // [rad], [m]
+        const float slide = float(random(0.01, 0.05)), fall = 0.003f;                    // motion of the step [m]
+        const glm::quat frame = glm::angleAxis(float(random(-3, 3)), glm::vec3(0, 0, 1));
+        const glm::vec3 flat(0, 0, 1), steep(-std::sin(slope), 0, std::cos(slope));
+        CAPTURE(start, patch, slope, foot, slide);
+        std::vector<Contact> contacts;
+        std::vector<float> sideOf;  // by feature: y of contacts with the slope, 0 for others
+        const auto add = [&](const glm::vec3& place, const glm::vec3& normal) {
+            const float approach = -glm::dot(normal, glm::vec3(slide, 0, -fall));
+            contacts.push_back({frame * place, frame * normal, float(random(-1e-4, 0)), std::uint32_t(sideOf.size()),
+                                std::max(approach, 0.f)});
+            sideOf.push_back(normal == steep ? place.y : 0);
+        };
+        for (int i = -3; i <= 3; ++i)
+            for (int j = -3; j <= 3; ++j) {
+                const glm::vec3 place = 0.1f * glm::vec3(float(i), float(j), 0);
+                add(place, flat);
+                if (place.x > foot) add(place, steep);
+            }
+        bool left = false, right = false;
+        for (const std::uint32_t feature : featuresOf(reduce(contacts).patches)) {
+            left |= sideOf[feature] < 0;
+            right |= sideOf[feature] > 0;
+        }
+        CHECK((left && right));
+    }
+}
+
 TEST_CASE("Contact reduction keeps its selection until the bodies have moved, and updates positions") {
     std::vector<Contact> contacts = circle();
     ContactReduction reduction;
     const Pose here;
-    reduction.update(contacts, here, here);
+    reduction.update(contacts, here, here, 0);
     const std::set<std::uint32_t> first = featuresOf(reduction.reduced().patches);
     const float slack = reduction.reduced().slack;
     REQUIRE(slack > 0);
@@ -132,7 +167,7 @@ TEST_CASE("Contact reduction keeps its selection until the bodies have moved, an
     };
     const auto after = [&](std::vector<Contact> all, const Pose& a, const Pose& b) {
         ContactReduction next = reduction;
-        next.update(all, a, b);
+        next.update(all, a, b, 0);
         return next.reduced().patches;
     };
     const Pose hardly{{0, 0.9f * slack, 0}}, farther{{0, 1.1f * slack, 0}},
@@ -158,9 +193,9 @@ TEST_CASE("Contact reduction keeps its selection until the bodies have moved, an
     std::vector<Contact> approaching = standing;
     for (Contact& contact : approaching) contact.approach = std::max(0.5f * contact.position.x, 0.f);
     ContactReduction stopped;
-    stopped.update(approaching, here, here);
+    stopped.update(approaching, here, here, 0);
     REQUIRE(stopped.reduced().slack == 0);
-    stopped.update(standing, here, here);
+    stopped.update(standing, here, here, 0);
     const auto minX = [](const ReducedContacts& reduced) {
         float lowest = 0;
         for (const ContactPatch& patch : reduced.patches)

@@ -323,4 +323,29 @@ TEST_CASE("A body that slides over a ridge of triangles is not stopped by the pl
         CHECK_FALSE(timeOfImpact(body, ground, {.penetration = true}).found);
     }
 }
+
+TEST_CASE("A body that gets too deep beyond a ridge of triangles is stopped by the slope there") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float half = 0.3f;
+    const Collider block = colliderOf(shapes::box({half, half, half}));
+    const float voxel = block.field().voxelSize();
+    for (int round = 0; round < 100; ++round) {
+        // A slope for negative x, flat for positive x. The block's lower front edge, which leads, enters the slope and
+        // ends below the flat part.
+        const auto slope = float(random(0.18, 0.22)), start = float(random(2.5, 3.2)), beyond = float(random(0.5, 1.2));
+        const TriangleSheet sheet = bentSheet(-9 * slope, 0);
+        const glm::quat rotation = randomRotation(random),
+                        dive = glm::angleAxis(float(random(0.3, 0.6)), glm::vec3(0, 1, 0));
+        const PlacedShape ground{ContactShape::triangles(sheet), {{0, 0, 0}, rotation}};
+        const glm::vec3 edge = voxel * glm::vec3(-start, 0, -slope * start - 0.1f);
+        PlacedShape body{ContactShape(block), {rotation * (edge - dive * glm::vec3(half, 0, -half)), rotation * dive}};
+        body.motion.displacement = rotation * glm::vec3((start + beyond) * voxel, 0, 0);
+        CAPTURE(round, slope, start, beyond);
+        const Impact impact = timeOfImpact(body, ground, {.penetration = true});
+        REQUIRE(impact.found);
+        CHECK(std::abs(glm::dot(impact.distance.normal, rotation * glm::vec3(0, 0, 1))) > 0.9999f);
+    }
+}
 }  // namespace bilayer::time_of_impact_test
