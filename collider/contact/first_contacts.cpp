@@ -106,13 +106,15 @@ class Separations {
             } else {
                 common = std::min(common, contacts[i].approach);
             }
+        const auto gapOf = [&](const Contact& contact) {
+            if (contact.distance > 0) return contact.remaining() - first;
+            return rotation < maxStraightRotation ? contact.remaining() + common : contact.distance;
+        };
         rotation_ = extent_ > 0 ? std::min(approach / extent_, maxStepRotation) : 0;
         for (std::size_t k = 0; k < count_; ++k) {
             const Contact& contact = contacts[group[k]];
             const glm::vec3 torque = glm::cross(contact.position - centre, contact.normal);
-            column(gap)[k] = contact.distance > 0             ? contact.remaining() - first
-                             : rotation < maxStraightRotation ? contact.remaining() + common
-                                                              : contact.distance;
+            column(gap)[k] = gapOf(contact);
             column(tiltX)[k] = glm::dot(torque, x);
             column(tiltY)[k] = glm::dot(torque, y);
             column(shiftX)[k] = extent_ * glm::dot(contact.normal, x);
