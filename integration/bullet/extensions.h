@@ -67,6 +67,9 @@ struct ExtensionOptions {
     ///
     /// Not handled are fields, planes and boxes as ground, compounds that hold one of these, ground that moves, and
     /// bodies without a field.
+    ///
+    /// Set `m_splitImpulsePenetrationThreshold` of the world's solver to minus a voxel [m]. By Bullet's default of -4
+    /// cm shallower penetrations become speed: at 60 steps a second, bodies gain energy on waves of some centimetres.
     bool smoothGround = true;
 
     /// Gyroscopic integrator: bodies without external forces keep their angular momentum, and their energy to second
