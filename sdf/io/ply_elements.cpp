@@ -199,7 +199,10 @@ class RecordReader {
     }
 
   private:
-    std::string name(std::size_t index) const { return fmt::format("{} {}", element_.name, index); }
+    std::string name(std::size_t index) const {
+        const bool isUsual = element_.name == "vertex" || element_.name == "face";
+        return fmt::format("{} {}", isUsual ? element_.name : quotedWord(element_.name), index);
+    }
 
     void skip(Values& values, const PlyProperty& property, std::size_t index) const {
         values.skip(property.type, property.countType ? readCount(values, property, index) : 1);

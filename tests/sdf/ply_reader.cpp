@@ -15,6 +15,7 @@
 namespace bilayer::ply_reader_test {
 using namespace bilayer::test;
 using Catch::Contains;
+using namespace std::string_literals;
 
 TEST_CASE("PLY: any format, types, order of elements, line ends, and data between") {
     for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"})
@@ -93,6 +94,36 @@ TEST_CASE("PLY: an error in binary data names the byte of the value") {
     std::memcpy(&bytes[at], &bad, sizeof bad);
     CHECK_THROWS_WITH(readMesh(write("infinite.ply", bytes)),
                       Contains(fmt::format("infinite.ply: byte {}: vertex 3: its y is inf", at)));
+}
+
+TEST_CASE("PLY: errors quote names of elements and lists on one line, shortened") {
+    for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"})
+        for (const std::string& name : {std::string("\x1b[31mparts"), std::string(5000, 'a')})
+            for (const bool isReal : {false, true}) {
+                CAPTURE(format, name.size(), isReal);
+                const bool isText = format == std::string("ascii");
+                const std::string header = fmt::format(
+                    "ply\nformat {} 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\nproperty uchar z\n"
+                    "element {} 1\nproperty list {} uchar {}\nelement face 1\nproperty list uchar uchar "
+                    "vertex_indices\n"
+                    "end_header\n",
+                    format, name, isReal ? "float" : "char", name);
+                // one vertex, and a list of -1 or of not a number of items
+                const std::string nan = format[7] == 'l' ? std::string("\0\0\xc0\x7f", 4) : "\x7f\xc0\0\0"s;
+                const std::string data = isText
+                                             ? "0 0 0\n"s + (isReal ? "nan" : "-1") + "\n"
+                                             : std::string(3, '\0') + (isReal ? nan : "\xff"s) + std::string(9, '\0');
+                try {
+                    readMesh(write("names.ply", header + data));
+                    FAIL("read");
+                } catch (const std::exception& error) {
+                    const std::string text = error.what();
+                    CAPTURE(text);
+                    CHECK_THAT(text, Contains("its list"));
+                    CHECK(text.size() < 300);
+                    CHECK(std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; }));
+                }
+            }
 }
 
 TEST_CASE("PLY: words of a text may stand on any lines") {
