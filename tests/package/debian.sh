@@ -20,7 +20,8 @@ for file in /etc/apt/apt.conf.d/*proxy* /etc/apt/apt.conf.d/*registry*; do
   [[ ! -f $file ]] || options+=(--aptopt="$file")
 done
 options+=(--variant=minbase --quiet bookworm)
-mmdebstrap --simulate "${options[@]}" "$root" || skip "mmdebstrap finds no Debian mirror"
+mmdebstrap --simulate "${options[@]}" "$root/simulated" || skip "mmdebstrap finds no Debian mirror"
+rm -rf "$root/simulated"
 mmdebstrap "${options[@]}" "$root"
 
 mkdir -p "$root/packages" "$root/user" "$root/source/docs/start" "$root/source/tests"
