@@ -20,7 +20,7 @@ namespace {
 
 /// A separation below this defines no direction [sizes of the larger body].
 constexpr double minDirection = 1e-7;
-// Meshes that are this close may intersect: distances are exact to this fraction of the size of the first body.
+/// Meshes that are this close may intersect: distances are exact to this fraction of the size of the first body.
 constexpr float touchTolerance = 1e-6f;
 /// The refinement of the deepest point: max count of steps, and the first and last distance to the point ahead
 /// [voxels].
