@@ -20,8 +20,6 @@ namespace {
 
 /// A separation below this defines no direction [sizes of the larger body].
 constexpr double minDirection = 1e-7;
-/// Meshes that are this close may intersect: distances are exact to this fraction of the size of the first body.
-constexpr float touchTolerance = 1e-6f;
 /// The refinement of the deepest point: max count of steps, and the first and last distance to the point ahead
 /// [voxels].
 constexpr int refinements = 40;
@@ -145,11 +143,6 @@ BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& o
                         start ? TriangleIndices{start->triangleA, start->triangleB} : TriangleIndices{});
     if (start) *start = {found.triangleA, found.triangleB};
     if (found.found() && found.distance == 0) return intersecting(bodies, found);
-    // the search may have ended at a pair that all but touches, before it met one that intersects
-    if (found.found() && float(found.distance) * b.scale <= touchTolerance * sizeOf(a)) {
-        const BodyDistance deepest = intersecting(bodies, found);
-        if (deepest.distance < -touchTolerance * sizeOf(a)) return deepest;
-    }
     if (isInside(bodies)) return contained(deepestOf(bodies), Overlap::aInsideB);
     const Bodies reversed = bodies.swapped();
     if (isInside(reversed)) return contained(swapped(deepestOf(reversed)), Overlap::bInsideA);

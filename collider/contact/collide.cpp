@@ -3,7 +3,6 @@
 #include <bilayer/collider/contact.h>
 
 #include <algorithm>
-#include <glm/geometric.hpp>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -169,8 +168,7 @@ ContactReport collideWithin(ContactRange range, const Placed& a, const Placed& b
                                              visit(lists ? &lists->ofB : nullptr));
     if (options.exact) refineClosest(std::span(contacts).subspan(first), a, b);
     removeInfinite(contacts, first);
-    if (options.reduced)
-        reduceFrom(first, contacts, a.pose, b.pose, glm::length(a.motion.rotation - b.motion.rotation), cache);
+    if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, relativeRotation(a.motion, b.motion), cache);
     return report;
 }
 

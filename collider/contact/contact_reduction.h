@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
@@ -71,6 +72,11 @@ class ContactReduction {
     std::vector<Kept> kept_;                ///< of all patches, concatenated
     std::vector<std::uint32_t> byFeature_;  ///< indices into `kept_`, in ascending order of features
 };
+
+/// The angle by which two bodies rotate relative to each other in a step [rad].
+inline float relativeRotation(const Motion& a, const Motion& b) {
+    return glm::length(a.rotation - b.rotation);
+}
 
 /// Replaces the contacts from number `first` on by the reduced ones (ContactOptions::reduced).
 /// @param a, b      poses of the bodies

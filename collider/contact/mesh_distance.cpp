@@ -278,8 +278,9 @@ class PairSearch {
         heightsB_.setDirection(-direction);
     }
 
+    // Where a pair all but touches, others may intersect: they are looked for.
     void setLimit() {
-        limit_ = std::max(best_.distance - margin_, 0.0);
+        limit_ = best_.distance > margin_ ? best_.distance - margin_ : best_.distance;
         limit2_ = limit_ * limit_;
     }
 

@@ -107,8 +107,7 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
     if (order.isSwapped)
         for (std::size_t i = first; i < contacts.size(); ++i) contacts[i] = swappedContact(contacts[i]);
     removeInfinite(contacts, first);
-    if (options.reduced)
-        reduceFrom(first, contacts, a.pose, b.pose, glm::length(a.motion.rotation - b.motion.rotation), cache);
+    if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, relativeRotation(a.motion, b.motion), cache);
     return report;
 }
 

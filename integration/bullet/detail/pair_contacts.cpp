@@ -4,7 +4,6 @@
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 
 #include <algorithm>
-#include <glm/geometric.hpp>
 #include <limits>
 
 #include <bilayer/collider/contact.h>
@@ -141,8 +140,7 @@ void Pair::find(const Side& a, const Side& b, float margin, bool exact) {
 
 void Pair::finish(const Side& a, const Side& b) {
     found_ = static_cast<int>(contacts_.size());
-    const float rotation = glm::length(a.motion().rotation - b.motion().rotation);
-    reduction_.update(contacts_, toPose(a.transform), toPose(b.transform), rotation);
+    reduction_.update(contacts_, toPose(a.transform), toPose(b.transform), relativeRotation(a.motion(), b.motion()));
     continuity_ = continuityOf(a, b);
     details_.clear();
     const SteppedBody bodyA = steppedBody(a), bodyB = steppedBody(b);
