@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""usage: contact_pictures.py: draws pictures of contacts: docs/patch.svg, docs/normals.svg, docs/sweep.svg, docs/shapes.svg and
-docs/blocks_of_a_body.svg of what the Python module finds, docs/smooth_ground.svg of runs of ./run demo terrain.
+"""usage: contact_pictures.py: draws pictures of contacts: docs/patch.svg, docs/normals.svg, docs/sweep.svg, docs/speculative.svg,
+docs/shapes.svg and docs/blocks_of_a_body.svg of what the Python module finds, docs/smooth_ground.svg of runs of ./run demo terrain.
 
 Needs ./run python, ./run build demo_terrain and Debian's package glmark2-data; run it with PYTHONPATH=build/release/python."""
 
@@ -86,6 +86,31 @@ def sweep():
     svg("sweep.svg", 640, 270, [f'<rect x="385" y="20" width="30" height="220" fill="{GROUND}" stroke="{DARK}" stroke-width="2"/>',
         *between, drawn(0, BODY, "#b5651d"), drawn(1, "none", GREY), drawn(impact.fraction, BODY, RED), label(60, 215, "start of the step"),
         label(215, 255, f"first touch, at {impact.fraction:.2f} of the step", RED), label(460, 255, "without it: the step's end")])
+
+
+def speculative():
+    """A ball that moves by more than its diameter in a step: where it starts, its contacts on the way, where it would end."""
+    mesh, outline = hill()
+    ground = bilayer.Collider(mesh, bilayer.build(mesh, voxel_size=0.04, half_width_voxels=6))
+    radius, start, motion = 0.35, np.array([-1.2, 1.6]), np.array([1.1, -1.9])
+    ball = bilayer.sphere(radius)
+    body = bilayer.Collider(ball, bilayer.build(ball, voxel_size=0.05, half_width_voxels=4))
+    found = bilayer.collide(body, bilayer.Pose((*start, 0)), ground, None, margin=0.04, motion_a=np.array([[*motion, 0], [0, 0, 0]]))
+
+    def at(x, y):
+        return 320 + 75 * x, 190 - 75 * y
+
+    def circle(centre, style):
+        return '<circle cx="{:.1f}" cy="{:.1f}" r="{:.1f}" {}/>'.format(*at(*centre), 75 * radius, style)
+
+    drawn = ['<path d="M' + "L".join("{:.1f} {:.1f}".format(*at(*point)) for point in outline) + f'z" fill="{GROUND}" stroke="{DARK}"/>',
+             circle(start + motion, f'fill="none" stroke="{GREY}" stroke-width="2" stroke-dasharray="6 4"'),
+             circle(start, f'fill="{BODY}" stroke="#b5651d"')]
+    for place, normal, distance in zip(found.position[:, :2], found.normal[:, :2], found.distance):
+        (x, y), (u, v) = at(*place), at(*(place - motion * distance / -normal.dot(motion)))
+        drawn.append(f'<path d="M{u:.1f} {v:.1f}L{x:.1f} {y:.1f}" stroke="{GREY}"/><circle cx="{x:.1f}" cy="{y:.1f}" r="2.5" fill="{RED}"/>')
+    svg("speculative.svg", 640, 300, [*drawn, label(20, 30, "a fast ball at the start of a step"),
+        label(20, 50, f"its {len(found)} speculative contacts", RED), label(430, 60, "dashed: the step\'s end")])
 
 
 def hill():
@@ -203,6 +228,7 @@ if __name__ == "__main__":
     patch()
     normals()
     sweep()
+    speculative()
     shapes()
     blocks_of_a_body()
     smooth_ground()

@@ -2,18 +2,16 @@
 """usage: fragments.py SOURCE BUILD SCRATCH: compiles the fragments of C++ on pages, each as the body of a function.
 
 A fragment is a block of C++ that does not begin with the name of a file. A comment before it, `<!-- given: TYPE NAME, ... -->`,
-declares what it uses. All public headers are included, and the namespace bilayer is used.
+declares what it uses. run_page.py runs those that change a program of their page. All public headers are included, and the namespace bilayer is used.
 """
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
 
-from page import blocks
+from page import INCLUDE, blocks
 
-INCLUDE = re.compile(r"^#include .*\n", re.M)
 SYSTEM = ["/usr/include/bullet", "/usr/include/Imath"]
 
 
@@ -22,7 +20,7 @@ def fragments(source):
     for path in [*pages, *sorted(source.glob("docs/start/*.md")), *sorted(source.glob("docs/howto/*.md"))]:
         page = path.read_text()
         for block in blocks(page):
-            if block.language == "cpp" and not block.file_name():
+            if block.language == "cpp" and not block.file_name() and block.use in (None, "given"):
                 yield path.relative_to(source), page.count("\n", 0, block.begin) + 1, block
 
 
@@ -33,7 +31,7 @@ def program(source):
     for path, line, block in fragments(source):
         includes += INCLUDE.findall(block.text)
         body = INCLUDE.sub("\n", block.text)
-        functions.append(f'static void fragment{len(functions)}({block.given or ""}) {{\n#line {line} "{path}"\n{body}}}\n')
+        functions.append(f'static void fragment{len(functions)}({block.where or ""}) {{\n#line {line} "{path}"\n{body}}}\n')
     return "".join(includes) + "using namespace bilayer;\n" + "".join(functions), len(functions)
 
 

@@ -4,7 +4,7 @@
 import re
 from dataclasses import dataclass
 
-BLOCK = re.compile(r"(?:^<!-- given: (?P<given>[^\n]*?) -->\n+)?^```(?P<language>[\w-]*)\n(?P<text>.*?)^```$", re.M | re.S)
+BLOCK = re.compile(r"(?:^<!-- (?P<use>given|after|instead): (?P<where>[^\n]*?) -->\n+)?^```(?P<language>[\w-]*)\n(?P<text>.*?)^```$", re.M | re.S)
 NUMBER = re.compile(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
 # rows of times, memory and processors: only their presence is compared
 MEASURED = re.compile(r"^\s*(files|time|build(?!\s+--)|peak memory|filled by)\s.*$", re.M)
@@ -17,7 +17,10 @@ class Block:
     language: str
     text: str
     begin: int  # of the text within the page
-    given: str | None = None  # parameters of a fragment of C++
+    # Of a fragment of C++ that a comment stands before. "given": where has the parameters of a function. "after" and
+    # "instead": where is FILE: LINE or FILE: FIRST LINE: LAST LINE, parts of lines of a program on the page that it changes.
+    use: str | None = None
+    where: str | None = None
 
     def file_name(self):
         """The name in a comment on the first line, of a block that is a whole file: `// field.cpp`, `# CMakeLists.txt`."""
@@ -25,8 +28,22 @@ class Block:
         return match.group(1) if match else None
 
 
+INCLUDE = re.compile(r"^#include .*\n", re.M)
+
+
+def changed(program, block):
+    """A program with a fragment in it: its includes at the top, the rest after or instead of the lines that it names."""
+    _, first, *last = block.where.split(": ")
+    lines = program.splitlines(keepends=True)
+    begin = next(i for i, line in enumerate(lines) if first in line)
+    end = begin + 1 + (next(i for i, line in enumerate(lines[begin:]) if last[0] in line) if last else 0)
+    lines[begin if block.use == "instead" else end:end] = [INCLUDE.sub("", block.text).lstrip("\n")]
+    head = lines.index("\n")
+    return "".join([*lines[:head], *INCLUDE.findall(block.text), *lines[head:]])
+
+
 def blocks(page):
-    return [Block(m["language"], m["text"], m.start("text"), m["given"]) for m in BLOCK.finditer(page)]
+    return [Block(m["language"], m["text"], m.start("text"), m["use"], m["where"]) for m in BLOCK.finditer(page)]
 
 
 def commands(text):

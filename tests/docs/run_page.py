@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""usage: run_page.py [--write] [--given FILE[=NAME]] [--from HEADING] [--until HEADING] [--packages DIR]
+"""usage: run_page.py [--write] [--given FILE[=NAME]] [--from HEADING] [--until HEADING] [--packages DIR | --checkout]
 SOURCE BUILD SCRATCH PAGE
 
-Does what a page shows, in its order, in an empty folder: writes its files, runs its commands and its Python, and compares
+Does what a page shows, in its order, in an empty folder: writes and changes its files, runs its commands and its Python, and compares
 outputs with those on the page. --write puts the outputs of this run into the page instead. Exit status 4: something that
 the page needs is not installed.
 
-Commands run as on a reader's machine, except for these, which tests/docs/stand-ins replaces: `./run` other than `./run
-build`; `sudo apt`, which only looks; `sudo cmake --install`, which installs below SCRATCH.
+Commands run as on a reader's machine, except for these, which tests/docs/stand-ins replaces: `./run` other than its
+commands build and package; `sudo apt`, which only looks; `sudo cmake --install`, which installs below SCRATCH.
 
-With --packages, in a clean root (tests/package/debian.sh), all commands are real but `./run`: its packages are in DIR.
+In a clean root, no command is replaced: with --checkout (tests/package/sources.sh), the folder is SOURCE. With --packages
+(tests/package/debian.sh), `./run` is, and DIR has the packages that it would make.
+
 --given puts a file into the folder first. --from leaves out what stands before a heading, --until that heading and what follows it.
 """
 
@@ -20,7 +22,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from page import blocks, commands, same_output
+from page import blocks, changed, commands, same_output
 
 SKIPPED = 4
 TIME_LIMIT = 900  # [s] of a page
@@ -34,6 +36,7 @@ def parse():
     parser.add_argument("--from", dest="heading")
     parser.add_argument("--until")
     parser.add_argument("--packages", type=Path)
+    parser.add_argument("--checkout", action="store_true")
     for name in ("source", "build", "scratch"):
         parser.add_argument(name, type=lambda text: Path(text).resolve())
     parser.add_argument("page")
@@ -44,18 +47,23 @@ def quoted(text):
     return "'" + text.replace("'", "'\\''") + "'"
 
 
-def script(page, folder):
+def script(page, scratch):
     """A shell script of all that the page does, and the console commands whose outputs it prints between marks."""
-    lines, expected, python = ["set -euo pipefail"], [], []
+    lines, expected, python, files = ["set -euo pipefail"], [], [], {}
     for block in blocks(page):
         name = block.file_name()
+        if block.use in ("after", "instead"):
+            name = block.where.split(":")[0]
+            files[name] = changed(files[name], block)
+        elif name:
+            files[name] = block.text
         if name:
-            lines.append(f"cat >{name} <<'END OF FILE'\n{block.text}END OF FILE")
+            lines.append(f"cat >{name} <<'END OF FILE'\n{files[name]}END OF FILE")
         elif block.language == "sh":
             lines.append(block.text)
         elif block.language == "python":
             python.append(block.text)
-            path = folder.parent / f"python-{len(python)}.py"
+            path = scratch / f"python-{len(python)}.py"
             path.write_text("\n".join(python))
             lines.append(f"python3 {quoted(str(path))}")
         elif block.language == "console":
@@ -67,7 +75,7 @@ def script(page, folder):
 
 def environment(options, home):
     """Finds what the installation page has installed, as /usr/local is found without any setting."""
-    if options.packages:
+    if options.packages or options.checkout:
         return dict(os.environ, HOME=str(home), BILAYER_SOURCE=str(options.source))
     installed = options.scratch / "installed" / "usr" / "local"
     python = next(installed.glob("lib/python3*/*-packages"), None)
@@ -78,6 +86,15 @@ def environment(options, home):
                   BILAYER_SOURCE=str(options.source))
     result.update({"PYTHONPATH": str(python)} if python else {})
     return result
+
+
+def checkout(folder, options):
+    """A folder that looks as the sources do once they are built."""
+    (folder / "build").mkdir(parents=True)
+    (folder / "build" / "release").symlink_to(options.build)
+    (folder / "build" / "packages").symlink_to(options.packages or options.build.parent / "packages")
+    (folder / "run").symlink_to(options.source / "tests" / "docs" / "stand-ins" / "run")
+    return folder
 
 
 def outputs(printed, expected):
@@ -96,16 +113,11 @@ def main():
     options = parse()
     path = options.source / options.page
     page = path.read_text()
-    folder = options.scratch / options.page.replace("/", "-").removesuffix(".md") / "checkout"
-    shutil.rmtree(folder.parent, ignore_errors=True)
-    home = folder.parent / "home"
-    folder.mkdir(parents=True)
-    home.mkdir()
-    (folder / "build").mkdir()
-    (folder / "build" / "release").symlink_to(options.build)
-    if options.packages:
-        (folder / "build" / "packages").symlink_to(options.packages)
-    (folder / "run").symlink_to(options.source / "tests" / "docs" / "stand-ins" / "run")
+    scratch = options.scratch / options.page.replace("/", "-").removesuffix(".md")
+    shutil.rmtree(scratch, ignore_errors=True)
+    home = scratch / "home"
+    home.mkdir(parents=True)
+    folder = options.source if options.checkout else checkout(scratch / "checkout", options)
     for given in options.given:
         file, _, name = given.partition("=")
         if not Path(file).exists():
@@ -115,8 +127,9 @@ def main():
 
     begin = page.index(f"## {options.heading}\n") if options.heading else 0
     end = page.index(f"## {options.until}\n") if options.until else None
-    text, expected = script(page[begin:end], folder)
-    result = subprocess.run(["bash", "-c", text], cwd=folder, env=environment(options, home), text=True, timeout=TIME_LIMIT,
+    text, expected = script(page[begin:end], scratch)
+    result = subprocess.run(["bash", "-c", text], cwd=folder, env=environment(options, home), text=True,
+                            timeout=None if options.checkout else TIME_LIMIT,
                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     if result.returncode:
         print(result.stdout)

@@ -1,28 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # usage: debian.sh DIR: installs the packages in DIR into a clean Debian 12 root, and uses them there as users do: the command
-# line, a program by CMake and one by pkg-config, the Python module, and all that the pages of docs/start tell. Exits with 4, which skips it, where no root can be made.
+# line, a program by CMake and one by pkg-config, the Python module, and all that the pages of
+# docs/start tell. Exits with 4 where no root can be made.
 set -euo pipefail
-source=$(cd "$(dirname "$0")/../.." && pwd)
+. "$(dirname "$0")/functions.sh"
 packages=$(cd "${1:?"the folder of the packages"}" && pwd)
-
-skip() { echo "skipped: $*"; exit 4; }
-((EUID == 0)) || skip "only root can make a root folder"
-command -v mmdebstrap >/dev/null || skip "mmdebstrap is not installed"
 compgen -G "$packages/*.deb" >/dev/null || { echo "debian.sh: no packages in $packages"; exit 1; }
-
-root=$(mktemp -d)
-trap 'rm -rf "$root"' EXIT
-chmod 755 "$root"
-# the sources and proxies of this machine, Debian's alone
-options=()
-for file in /etc/apt/apt.conf.d/*proxy* /etc/apt/apt.conf.d/*registry*; do
-  [[ ! -f $file ]] || options+=(--aptopt="$file")
-done
-options+=(--variant=minbase --quiet bookworm)
-mmdebstrap --simulate "${options[@]}" "$root/simulated" || skip "mmdebstrap finds no Debian mirror"
-rm -rf "$root/simulated"
-mmdebstrap "${options[@]}" "$root"
+make_root
 
 mkdir -p "$root/packages" "$root/user" "$root/source/docs/start" "$root/source/tests"
 cp "$source/run" "$root/source/"
@@ -36,10 +21,7 @@ mkdir "$root/notices"
 sed -n '/^## Compiled in/,/^## Used/s/^|[^|]*|\([^|]*\)|.*/\1/p' "$source/docs/third-party.md" | grep -o '`[^`]*`' | tr -d '`' |
   while read -r package; do cp -L "/usr/share/doc/$package/copyright" "$root/notices/$package"; done
 (($(ls "$root/notices" | wc -l) >= 15)) || { echo "debian.sh: docs/third-party.md lists too few packages as compiled in"; exit 1; }
-cp -L /etc/resolv.conf /etc/hosts "$root/etc/"
-# nothing of this machine's environment but its proxies
-chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 \
-  http_proxy="${http_proxy:-}" https_proxy="${https_proxy:-}" bash -euo pipefail <<'IN_ROOT'
+in_root <<'IN_ROOT'
 cd /user
 apt-get update -qq
 install() { apt-get install -y -qq --no-install-recommends "$@" >/tmp/apt.log 2>&1 || { cat /tmp/apt.log; exit 1; }; }
@@ -76,7 +58,6 @@ PYTHON
 echo "== the pages of docs/start"
 apt-get purge -y -qq bilayer libbilayer-dev python3-bilayer >/dev/null 2>&1
 install sudo
-echo 'APT::Get::Assume-Yes "true";' >/etc/apt/apt.conf.d/yes
 mkdir /scratch
 do_page() { # PAGE [OPTIONS...]
   echo "$@"

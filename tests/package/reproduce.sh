@@ -4,14 +4,14 @@
 # a compiler cache, and compares the bytes.
 set -euo pipefail
 packages=$(cd "${1:?"the folder of the packages"}" && pwd)
-cd "$(dirname "$0")/../.."
+. "$(dirname "$0")/functions.sh"
+cd "$source"
 export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)}
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 copy=$folder/sources-in-another-folder
-mkdir "$copy"
-git ls-files -z --cached --others --exclude-standard | tar --create --null --files-from=- | tar --extract --directory="$copy"
+copy_sources "$copy"
 (cd "$copy" && unset CMAKE_CXX_COMPILER_LAUNCHER && CCACHE_DISABLE=1 ./run package)
 
 same=1
