@@ -19,6 +19,7 @@ copyright = "the authors of bilayer"
 version = release = re.search(r"project\(bilayer VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text()).group(1)
 
 extensions = ["myst_parser", "breathe"]
+myst_enable_extensions = ["tasklist"]
 root_doc = "README"
 source_suffix = {".md": "markdown"}
 include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "RELEASE.md", "docs/**.md"]
