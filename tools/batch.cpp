@@ -169,7 +169,7 @@ void addLimits(CLI::App& command, BatchArguments& a) {
 }  // namespace
 
 void addBatch(CLI::App& app) {
-    auto* command = app.add_subcommand("batch", "Build the fields of a library of meshes, each in its own process");
+    auto* command = app.add_subcommand("batch", "Build the fields of a library of meshes, in processes of their own");
     const auto a = std::make_shared<BatchArguments>();
     addSources(*command, *a);
     addLimits(*command, *a);

@@ -97,6 +97,41 @@ TEST_CASE("a crash ends one mesh alone") {
     CHECK(leftovers(output).empty());
 }
 
+TEST_CASE("a mesh whose process ends is tried again if that process has converted others") {
+    const int kills = GENERATE(1, 2);
+    CAPTURE(kills);
+    const fs::path library = boxLibrary("again", smallCount), output = emptyFolder("again_fields");
+    writeMesh(library / "z.ply", shapes::sphere(hugeRadius / 2, 5));  // the last one takes a while
+    const pid_t batch = start(batchWords(library, output, {"--threads", "1"}));
+    while (fieldsIn(output).size() < smallCount && ::kill(batch, 0) == 0)
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    pid_t killed = 0;
+    for (int i = 0; i < kills; ++i) {
+        std::vector<pid_t> children;
+        while ((children = childrenOf(batch, 1)).empty() || children[0] == killed)
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        ::kill(killed = children[0], SIGKILL);
+    }
+    CHECK(wait(batch) == kills - 1);
+    const auto records = recordsOf(output);
+    CHECK(records.size() == smallCount + 1);
+    CHECK(records.at("z.ply")["outcome"] == (kills == 1 ? "done" : "failed"));
+    CHECK(leftovers(output).empty());
+}
+
+TEST_CASE("the peak memory of a mesh is its own, not that of a mesh before it") {
+    const fs::path library = emptyFolder("peaks"), output = emptyFolder("peaks_fields");
+    writeMesh(library / "a.ply", shapes::sphere(hugeRadius / 2, 5));
+    writeMesh(library / "b.ply", shapes::box({0.5f, 0.5f, 0.5f}));
+    const Result r = run(batchWords(library, output, {"--threads", "1"}));
+    REQUIRE(r.status == 0);
+    const auto records = recordsIn(r.out);
+    const double large = records.at("a.ply")["peakBytes"], small = records.at("b.ply")["peakBytes"];
+    CAPTURE(large, small);
+    CHECK(small < large / 2);
+}
+
 TEST_CASE("an interrupted batch leaves no half file, and continues where it was") {
     const int signal = GENERATE(SIGINT, SIGTERM, SIGKILL);
     CAPTURE(signal);

@@ -24,12 +24,13 @@ namespace fs = std::filesystem;
 
 // Time between two checks of outputs that other batches have locked, and max time between two progress lines [ms].
 constexpr int lockInterval = 200, progressInterval = 500;
+// A process that has used more memory converts no other mesh: it would keep a part of it.
+constexpr std::uint64_t maxReusedMemory = 128 << 20;
 
 /// A mesh whose worker runs.
 struct RunningMesh {
     const BatchMesh* mesh;
-    bool isLarge;
-    int threads;
+    WorkerTask task;
     OutputLock lock;
     Stopwatch watch;
     std::unique_ptr<Worker> worker;
@@ -92,7 +93,7 @@ class Scheduler {
     }
 
     bool canStartSmall() const {
-        return running_.size() < std::size_t(plan_.threads) && (running_.empty() || !running_.front()->isLarge);
+        return running_.size() < std::size_t(plan_.threads) && (running_.empty() || !running_.front()->task.isLarge);
     }
 
     // Meshes that are fewer than the threads share them.
@@ -110,16 +111,29 @@ class Scheduler {
         clean(*mesh);  // what a batch that was killed has left
         const fs::path work = plan_.folder.work(mesh->name);
         fs::create_directory(work);
-        const ConversionTask task{.mesh = mesh->file,
-                                  .output = plan_.folder.field(mesh->name),
-                                  .work = work,
-                                  .threads = isLarge ? plan_.threads : threadsOfSmall(),
-                                  .mayBeLarge = isLarge || plan_.threads == 1};
-        running_.push_back(
-            std::unique_ptr<RunningMesh>(new RunningMesh{mesh, isLarge, task.threads, std::move(*lock), {}, nullptr}));
-        running_.back()->worker = std::make_unique<Worker>(plan_.limits, [&, task] {
-            return convert(plan_.conversion, task).dump(-1, ' ', false, Json::error_handler_t::replace);
+        const WorkerTask task{.mesh = std::size_t(mesh - plan_.meshes.data()),
+                              .threads = isLarge ? plan_.threads : threadsOfSmall(),
+                              .isLarge = isLarge};
+        std::unique_ptr<Worker> worker = idle_.empty() ? newWorker() : std::move(idle_.back());
+        if (!idle_.empty()) idle_.pop_back();
+        running_.push_back(std::unique_ptr<RunningMesh>(
+            new RunningMesh{mesh, task, std::move(*lock), Stopwatch(), std::move(worker)}));
+        running_.back()->worker->begin(task);
+    }
+
+    std::unique_ptr<Worker> newWorker() const {
+        return std::make_unique<Worker>(plan_.limits, [this](const WorkerTask& task) {
+            return convert(task).dump(-1, ' ', false, Json::error_handler_t::replace);
         });
+    }
+
+    Json convert(const WorkerTask& task) const {
+        const BatchMesh& mesh = plan_.meshes[task.mesh];
+        return tools::convert(plan_.conversion, {.mesh = mesh.file,
+                                                 .output = plan_.folder.field(mesh.name),
+                                                 .work = plan_.folder.work(mesh.name),
+                                                 .threads = task.threads,
+                                                 .mayBeLarge = task.isLarge || plan_.threads == 1});
     }
 
     // Waits until a worker answers, ends or is late, a signal arrives, or something is to be looked at again.
@@ -127,7 +141,7 @@ class Scheduler {
         std::vector<pollfd> files{{signals_.file(), POLLIN, 0}};
         int timeout = locked_.empty() ? progressInterval : lockInterval;
         for (const auto& running : running_) {
-            files.push_back({running->worker->pipe(), POLLIN, 0});
+            files.push_back({running->worker->socket(), POLLIN, 0});
             if (const int left = running->worker->millisecondsLeft(); left >= 0) timeout = std::min(timeout, left);
         }
         if (::poll(files.data(), files.size(), timeout) < 0 && errno != EINTR)
@@ -145,9 +159,24 @@ class Scheduler {
             Worker& worker = *running_[i]->worker;
             const bool hasEnded = ready_[i] && !worker.read();
             if (!hasEnded && worker.millisecondsLeft() != 0) continue;
-            settle(*running_[i], worker.finish());
+            const WorkerEnd end = worker.finish();
+            if (hasEnded && end.answer.empty() && worker.isUsed()) {
+                tryAlone(*running_[i]);
+                continue;
+            }
+            settle(*running_[i], end);
+            if (!end.answer.empty() && end.peakMemory <= maxReusedMemory)
+                idle_.push_back(std::move(running_[i]->worker));
             running_.erase(running_.begin() + std::ptrdiff_t(i));
         }
+    }
+
+    // What meshes before this one have left in the process may be why it failed: a new process decides.
+    void tryAlone(RunningMesh& running) {
+        clean(*running.mesh);
+        fs::create_directory(plan_.folder.work(running.mesh->name));
+        running.worker = newWorker();
+        running.worker->begin(running.task);
     }
 
     void settle(const RunningMesh& running, const WorkerEnd& end) {
@@ -190,8 +219,8 @@ class Scheduler {
                     {"shard", plan_.shard.text()},
                     {"options", plan_.conversion.optionsText},
                     {"optionsHash", optionsHash_},
-                    {"threads", running.threads},
-                    {"alone", running.isLarge}};
+                    {"threads", running.task.threads},
+                    {"alone", running.task.isLarge}};
         record.update(known);
         record["seconds"]["total"] = running.watch.seconds();
         record["peakBytes"] = end.peakMemory;
@@ -210,6 +239,7 @@ class Scheduler {
     BatchResult result_;
     std::deque<const BatchMesh*> waiting_, large_, locked_;
     std::vector<std::unique_ptr<RunningMesh>> running_;
+    std::vector<std::unique_ptr<Worker>> idle_;
     std::vector<bool> ready_;  // of each running mesh: whether its worker has something to read
 };
 

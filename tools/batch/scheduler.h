@@ -33,8 +33,9 @@ struct BatchResult {
     std::string firstFailure;  ///< name and error of the first mesh that failed
 };
 
-/// Converts the meshes of a plan, each in a process of its own. Small meshes run side by side; a large mesh runs alone,
-/// with all threads, after the small ones. Meshes that other batches convert meanwhile are looked at again at the end.
+/// Converts the meshes of a plan in processes of their own, one after the other in each. A mesh whose process ends is
+/// tried again in a new one if the process had converted others, and fails alone. Small meshes run side by side; a
+/// large mesh runs alone, with all threads, after the small ones. Meshes that other batches convert meanwhile are looked at again at the end.
 /// Each mesh that is finished has a record. A signal ends all workers and leaves no partial output.
 ///
 /// The calling process must be single-threaded. Throws std::runtime_error if records, locks or folders cannot be

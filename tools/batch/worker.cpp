@@ -3,12 +3,14 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <poll.h>
 #include <signal.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -19,11 +21,14 @@
 #include <new>
 #include <system_error>
 
+#include "tools/output.h"
+
 namespace bilayer::tools {
 namespace {
 
 // Exit statuses of a child.
 constexpr int answered = 0, outOfMemory = 3, unexpectedEnd = 4;
+constexpr int keptMemory = 1 << 26;  // free memory that a worker keeps for its next task [bytes]
 constexpr off_t maxErrorText = 400;  // characters of standard error that a record quotes
 
 // Makes the standard streams those of a process without a terminal.
@@ -42,21 +47,46 @@ void limitResources(std::uint64_t memory) {
     ::setrlimit(RLIMIT_DATA, &data);
 }
 
-void send(int pipe, std::string_view text) {
+void send(int socket, std::string_view text) {
     while (!text.empty()) {
-        const ssize_t sent = ::write(pipe, text.data(), text.size());
+        const ssize_t sent = ::send(socket, text.data(), text.size(), MSG_NOSIGNAL);
         if (sent < 0 && errno == EINTR) continue;
         if (sent <= 0) ::_exit(unexpectedEnd);
         text.remove_prefix(std::size_t(sent));
     }
 }
 
-[[noreturn]] void live(pid_t parent, int pipe, int errors, std::uint64_t memory, const Worker::Work& work) noexcept {
+// Makes the peak of resident memory that of the next task, where the kernel allows it.
+void resetPeakMemory() {
+    const int file = ::open("/proc/self/clear_refs", O_WRONLY | O_CLOEXEC);
+    if (file < 0) return;
+    [[maybe_unused]] const ssize_t written = ::write(file, "5", 1);
+    ::close(file);
+}
+
+// Pages that the kernel takes back have to be filled again by the next task, which takes longer than a small build.
+void keepFreeMemory() {
+    ::mallopt(M_MMAP_THRESHOLD, keptMemory / 2);
+    ::mallopt(M_TRIM_THRESHOLD, keptMemory);
+    ::mallopt(M_TOP_PAD, keptMemory / 4);
+}
+
+void serve(int socket, const Worker::Work& work) {
+    keepFreeMemory();
+    WorkerTask task;
+    while (::recv(socket, &task, sizeof task, MSG_WAITALL) == ssize_t(sizeof task)) {
+        resetPeakMemory();
+        const std::string answer = work(task);
+        send(socket, fmt::format("{} {}\n", peakMemory(), answer));
+    }
+}
+
+[[noreturn]] void live(pid_t parent, int socket, int errors, std::uint64_t memory, const Worker::Work& work) noexcept {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent || !redirectStreams(errors)) ::_exit(unexpectedEnd);
     limitResources(memory);
     try {
-        send(pipe, work());
+        serve(socket, work);
         ::_exit(answered);
     } catch (const std::bad_alloc&) {
         ::_exit(outOfMemory);
@@ -85,13 +115,17 @@ std::string memoryText(std::uint64_t limit) {
 
 Worker::Worker(const WorkerLimits& limits, const Work& work) : limits_(limits) {
     int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "no pipe");
-    pipe_ = ends[0];
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+        throw std::system_error(errno, std::generic_category(), "no socket");
+    socket_ = ends[0];
     errors_ = ::memfd_create("stderr", MFD_CLOEXEC);
     const pid_t parent = ::getpid();
     if (errors_ >= 0) process_ = ::fork();
     const int error = errno;
-    if (process_ == 0) live(parent, ends[1], errors_, limits.memory, work);
+    if (process_ == 0) {
+        ::close(ends[0]);
+        live(parent, ends[1], errors_, limits.memory, work);
+    }
     ::close(ends[1]);
     if (process_ > 0) return;
     closeFiles();
@@ -107,19 +141,29 @@ Worker::~Worker() {
 }
 
 void Worker::closeFiles() {
-    ::close(pipe_);
+    ::close(socket_);
     if (errors_ >= 0) ::close(errors_);
+}
+
+void Worker::begin(const WorkerTask& task) {
+    ++begun_;
+    start_ = std::chrono::steady_clock::now();
+    answer_.clear();
+    // the child's standard error has the same offset
+    if (::ftruncate(errors_, 0) == 0) ::lseek(errors_, 0, SEEK_SET);
+    // a child that has ended is noticed when it is read
+    ::send(socket_, &task, sizeof task, MSG_NOSIGNAL);
 }
 
 bool Worker::read() {
     char bytes[1 << 12];
-    const ssize_t got = ::read(pipe_, bytes, sizeof bytes);
+    const ssize_t got = ::read(socket_, bytes, sizeof bytes);
     if (got < 0 && errno == EINTR) return true;
     if (got > 0)
         answer_.append(bytes, std::size_t(got));
     else
         hasEnded_ = true;
-    return !hasEnded_;
+    return !hasEnded_ && !answer_.ends_with('\n');
 }
 
 int Worker::millisecondsLeft() const {
@@ -130,23 +174,25 @@ int Worker::millisecondsLeft() const {
 }
 
 WorkerEnd Worker::finish() {
+    WorkerEnd end;
+    if (answer_.ends_with('\n')) {
+        const std::size_t space = answer_.find(' ');
+        end.peakMemory = std::stoull(answer_);
+        end.answer = answer_.substr(space + 1, answer_.size() - space - 2);
+        return end;
+    }
     if (!hasEnded_) ::kill(process_, SIGKILL);
     int status = 0;
     rusage usage{};
     while (::wait4(process_, &status, 0, &usage) < 0 && errno == EINTR) {
     }
     process_ = -1;
-    WorkerEnd end;
     end.peakMemory = std::uint64_t(usage.ru_maxrss) * 1024;
-    describe(end, status);
+    describeFailure(end, status);
     return end;
 }
 
-void Worker::describe(WorkerEnd& end, int status) const {
-    if (WIFEXITED(status) && WEXITSTATUS(status) == answered && !answer_.empty()) {
-        end.answer = answer_;
-        return;
-    }
+void Worker::describeFailure(WorkerEnd& end, int status) const {
     const std::string line = lastLine(errors_);
     const std::string detail = line.empty() ? "" : ": " + line;
     const bool isOutOfMemory =
