@@ -67,9 +67,24 @@ set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION
   "Headers and static libraries for fields, queries, contacts in Bullet, liquids, and OpenCL devices.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libbilayer-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-# what cmake/dependencies.cmake looks for
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libopenvdb-dev, libboost-iostreams-dev, libblosc-dev, libtbb-dev, libassimp-dev, libhwy-dev, libqhull-dev, libglm-dev, libfmt-dev, zlib1g-dev, libbullet-dev, ocl-icd-opencl-dev, opencl-clhpp-headers")
+# What cmake/dependencies.cmake looks for, in the versions that the static libraries are compiled with, or newer. Names of OpenVDB's
+# code have its major and minor version, and other versions of Bullet's classes have other sizes: those two may only have another
+# patch.
+set(depends)
+foreach(package IN ITEMS libopenvdb-dev libboost-iostreams-dev libblosc-dev libtbb-dev libassimp-dev libhwy-dev libqhull-dev libglm-dev
+    libfmt-dev libimath-dev zlib1g-dev libbullet-dev ocl-icd-opencl-dev opencl-clhpp-headers)
+  execute_process(COMMAND dpkg-query --show --showformat=\${source:Upstream-Version} ${package} OUTPUT_VARIABLE version ERROR_QUIET)
+  if(version MATCHES "^([0-9]+)\\.([0-9]+)")
+    list(APPEND depends "${package} (>= ${CMAKE_MATCH_1}.${CMAKE_MATCH_2})")
+    math(EXPR next_minor "${CMAKE_MATCH_2} + 1")
+    if(package STREQUAL "libopenvdb-dev" OR package STREQUAL "libbullet-dev")
+      list(APPEND depends "${package} (<< ${CMAKE_MATCH_1}.${next_minor}~)")
+    endif()
+  else()
+    list(APPEND depends ${package})
+  endif()
+endforeach()
+list(JOIN depends ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS)
 set(CPACK_DEBIAN_PYTHON_DESCRIPTION
   "The Python module: fields, queries, contacts and liquids on numpy arrays.")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-bilayer)

@@ -83,6 +83,7 @@ class Collider {
 /// @param keepMesh  false: store no mesh. Queries then use the field alone, which rounds sharp edges: contacts are
 ///                  those of ContactAccuracy::samples, ray hits are off by at most half a voxel, and swept motion stops
 ///                  up to 1.5 voxels late.
+///
 /// Throws as Collider's constructor does, and std::invalid_argument for a mesh of more than 2 GiB.
 LevelSet withBody(const LevelSet& levelSet, Mesh mesh, const ColliderOptions& options = {}, bool keepMesh = true);
 

@@ -210,6 +210,7 @@ class TiledField {
     /// voxels), and the smallest tile.
     /// @param folder  with manifest.json
     /// @param budget  max memory of the tiles that are kept; a single tile is kept even if it is larger [bytes]
+    ///
     /// Throws std::runtime_error that names a file that is missing or damaged.
     TiledField(const std::filesystem::path& folder, std::size_t budget, const FieldOptions& options = {});
 

@@ -40,6 +40,7 @@ class BlockFiller {
 
 /// Builds the signed distance field of a mesh. The bytes of the result do not depend on the thread count.
 /// @param filler  the device that fills the blocks; null: the CPU, by TBB
+///
 /// Throws std::invalid_argument that names the invalid option or triangle, Cancelled, and what the filler throws.
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler = nullptr);
 /// The same by a device.
@@ -58,6 +59,7 @@ LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller&
 /// @param old      the field of `oldMesh`, built with the same options
 /// @param newMesh  has as many triangles as `oldMesh`
 /// @param moved    indices of all triangles with a corner that moved, in any order; may contain others
+///
 /// Throws as build() does. Also throws std::invalid_argument if:
 /// - the field belongs to another mesh, voxel size, method or width;
 /// - the field lacks the nearest triangles that the options request;

@@ -44,6 +44,7 @@ struct MeshReport {
 /// Examines a mesh in O(n log n). Vertices with equal coordinates count as one.
 /// @param wall      walls thinner than this count as thin [m], often one voxel; 0 counts none
 /// @param progress  as BuildOptions::progress; the fraction counts the phases that are done
+///
 /// Throws as validate() does, and Cancelled.
 MeshReport inspect(const Mesh& mesh, float wall = 0, const std::function<bool(float)>& progress = {});
 

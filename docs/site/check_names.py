@@ -16,7 +16,7 @@ LEFT_OUT = re.compile(r"#|.*~|.*=delete$")
 def listed():
     for line in LISTED.read_text().splitlines():
         if not LEFT_OUT.match(line):
-            declaration = line.partition("(" if line.startswith("function ") else " = ")[0]
+            declaration = re.split(r"\(" if line.startswith("function ") else " = | : |, member ", line)[0]
             yield NAME.search(declaration).group()
 
 

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <string_view>
 
 #include "sdf/base/compress.h"
 
@@ -280,7 +281,8 @@ bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* 
 }
 
 const char* simdName() {
-    return HWY_DYNAMIC_DISPATCH(targetName)();
+    const char* name = HWY_DYNAMIC_DISPATCH(targetName)();
+    return std::string_view(name).starts_with("AVX3") ? "AVX-512" : name;  // Highway's word is its own
 }
 
 }  // namespace bilayer::detail

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
@@ -60,6 +61,23 @@ void requireCounts(const MeshReport& report, const Mesh& mesh) {
                         report.boundaryEdges, report.nonManifoldEdges, boundary, nonManifold));
 }
 
+/// The mesh with its points and triangles in reverse order.
+Mesh reversed(const Mesh& mesh) {
+    Mesh result = mesh;
+    std::reverse(result.points.begin(), result.points.end());
+    std::reverse(result.triangles.begin(), result.triangles.end());
+    const unsigned last = unsigned(mesh.points.size()) - 1;
+    for (glm::uvec3& t : result.triangles) t = last - t;
+    return result;
+}
+
+/// What a report counts, for all orders of points and triangles.
+auto countsOf(const MeshReport& r) {
+    return std::tuple(r.points, r.triangles, r.components, r.boundaryEdges, r.nonManifoldEdges, r.misorientedEdges,
+                      r.degenerateTriangles, r.duplicateTriangles, r.boundaryLoops, r.nonManifoldVertices,
+                      r.selfIntersections);
+}
+
 bool hasArea(const Mesh& mesh) {
     return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const glm::uvec3& t) {
         const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
@@ -81,6 +99,24 @@ void checkField(const Mesh& mesh, BuildOptions options) {
 }
 
 }  // namespace
+
+void checkInspect(Bytes recipe) {
+    ByteSource bytes(recipe);
+    const Mesh mesh = meshOf(bytes);
+    const float wall = std::abs(bytes.lattice());
+    try {
+        const MeshReport report = inspect(mesh, wall);
+        requirePlainError(verdict(report));
+        requireCounts(report, mesh);
+        const MeshReport other = inspect(reversed(mesh), wall);
+        require(countsOf(other) == countsOf(report),
+                "another order of the mesh has another report: " + verdict(report) + "; " + verdict(other));
+        require(report.thinWalls <= report.triangles && report.flippedTriangles <= report.triangles,
+                "a report counts more triangles than there are");
+    } catch (const std::invalid_argument& error) {
+        requirePlainError(error.what());
+    }
+}
 
 void checkBuild(Bytes recipe) {
     ByteSource bytes(recipe);

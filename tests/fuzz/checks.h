@@ -52,6 +52,8 @@ void checkStl(Bytes file);
 void checkOff(Bytes file);
 void checkRaw(Bytes file);
 void checkGltf(Bytes file);
+/// Reports on a structured mesh against counts over all edges, and against the same mesh in another order.
+void checkInspect(Bytes recipe);
 /// Exact and pseudonormal fields of a structured mesh against distances in double precision and winding numbers.
 void checkBuild(Bytes recipe);
 /// Reads a .vdb file, with its body, and queries it.

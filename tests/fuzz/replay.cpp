@@ -83,6 +83,10 @@ TEST_CASE("damaged glTF scenes are read or refused") {
     replay("gltf", 1000);
 }
 
+TEST_CASE("reports on structured meshes have the counts of all edges, in any order of triangles") {
+    replay("inspect", 1000);
+}
+
 TEST_CASE("fields of structured meshes, clean or not, are those of brute force") {
     replay("build", 100);
 }

@@ -209,6 +209,7 @@ const std::vector<FuzzCheck>& fuzzChecks() {
           "1e999",
           "-1"}},
         {"build", 200, checkBuild, recipeSeeds},
+        {"inspect", 200, checkInspect, recipeSeeds},
         {"vdb",
          100000,
          checkVdb,

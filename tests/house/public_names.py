@@ -3,7 +3,8 @@
 """usage: public_names.py [--write] [--build DIR] [KIND...]: compares what is public with the lists in tests/house; --write
 writes them anew.
 
-  names     of C++, with types, parameters, their default values, and the order of enumerators: public_names.txt
+  names     of C++, with types, bases, parameters, their default values, and the order of members and enumerators:
+            public_names.txt
   options   of the command line, with their types and default values: public_options.txt
   keys      of the output of --json, of runs: public_keys.txt
   python    names, parameters and fields of the Python module: public_python.txt
@@ -57,15 +58,23 @@ def initial(member):
     return f" = {value}" if value else ""
 
 
+def words_before(member):
+    return [word for word in ("static", "explicit") if member.get(word) == "yes"]
+
+
 def members_of(compound):
     name = compound.findtext("compoundname")
+    place = 0  # of a variable in its struct, which initialisers depend on
     for member in compound.iter("memberdef"):
         if member.get("prot") != "public" or member.get("kind") == "friend":
             continue
         arguments = re.sub(r"\s+", " ", member.findtext("argsstring") or "") if member.get("kind") == "function" else ""
         qualified = member.findtext("qualifiedname") or f"{name}::{member.findtext('name')}"
         value = initial(member) if member.get("kind") == "variable" else ""
-        yield " ".join(filter(None, (member.get("kind"), text(member, "type"), qualified + arguments))) + value
+        if member.get("kind") == "variable" and compound.get("kind") == "struct" and member.get("static") == "no":
+            place += 1
+            value += f", member {place}"
+        yield " ".join(filter(None, (member.get("kind"), *words_before(member), text(member, "type"), qualified + arguments))) + value
         for index, one in enumerate(member.findall("enumvalue")):
             yield f"value {qualified}::{one.findtext('name')}{initial(one) or f' = {index}'}"
 
@@ -87,7 +96,8 @@ def names(build):
         if "detail" in name.split("::") or name == "std":
             continue
         if kind in ("struct", "class") and compound.get("prot") == "public":
-            lines.append(f"{kind} {name}")
+            bases = [f"{base.get('prot')} {base.text}" for base in compound.findall("basecompoundref")]
+            lines.append(f"{kind} {name}" + (" : " + ", ".join(bases) if bases else ""))
         lines += members_of(compound)
     return lines
 

@@ -19,7 +19,7 @@ for page in field bullet liquid python contacts; do do_page $page; done
 do_page install --from "Look whether it works" --until "Remove the packages"
 removed
 do_page install --from "Into a folder of your own" --until "As Debian packages"
-/scratch/docs-start-install/home/bilayer/bin/bilayer --version
+"$(echo /scratch/docs-start-install/*/bilayer)/bin/bilayer" --version
 do_page install --from "As Debian packages" --until "Remove an installation from the sources"
 do_page install --from "Remove the packages"
 removed

@@ -39,8 +39,11 @@ struct RunningMesh {
 /// Moves what a worker has made to its place. Returns an error, or nothing.
 std::string moveTo(const fs::path& from, const fs::path& to) {
     std::error_code error;
-    fs::create_directories(to.parent_path(), error);
-    if (!error) fs::rename(from, to, error);
+    fs::rename(from, to, error);
+    if (error == std::errc::no_such_file_or_directory) {
+        fs::create_directories(to.parent_path(), error);
+        if (!error) fs::rename(from, to, error);
+    }
     return error ? fmt::format("cannot write {}: {}", to.string(), error.message()) : "";
 }
 
@@ -108,9 +111,7 @@ class Scheduler {
             locked_.push_back(mesh);
             return;
         }
-        clean(*mesh);  // what a batch that was killed has left
-        const fs::path work = plan_.folder.work(mesh->name);
-        fs::create_directory(work);
+        makeWorkFolder(*mesh);
         const WorkerTask task{.mesh = std::size_t(mesh - plan_.meshes.data()),
                               .threads = isLarge ? plan_.threads : threadsOfSmall(),
                               .isLarge = isLarge};
@@ -173,8 +174,7 @@ class Scheduler {
 
     // What meshes before this one have left in the process may be why it failed: a new process decides.
     void tryAlone(RunningMesh& running) {
-        clean(*running.mesh);
-        fs::create_directory(plan_.folder.work(running.mesh->name));
+        makeWorkFolder(*running.mesh);
         running.worker = newWorker();
         running.worker->begin(running.task);
     }
@@ -196,6 +196,14 @@ class Scheduler {
         }
         count(mesh, known);
         record(running, end, known);
+    }
+
+    // An empty one, in place of what a process that was killed has left.
+    void makeWorkFolder(const BatchMesh& mesh) {
+        const fs::path work = plan_.folder.work(mesh.name);
+        if (fs::create_directory(work)) return;
+        fs::remove_all(work);
+        fs::create_directory(work);
     }
 
     void clean(const BatchMesh& mesh) {

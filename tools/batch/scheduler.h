@@ -35,8 +35,9 @@ struct BatchResult {
 
 /// Converts the meshes of a plan in processes of their own, one after the other in each. A mesh whose process ends is
 /// tried again in a new one if the process had converted others, and fails alone. Small meshes run side by side; a
-/// large mesh runs alone, with all threads, after the small ones. Meshes that other batches convert meanwhile are looked at again at the end.
-/// Each mesh that is finished has a record. A signal ends all workers and leaves no partial output.
+/// large mesh runs alone, with all threads, after the small ones. Meshes that other batches convert meanwhile are
+/// looked at again at the end. Each mesh that is finished has a record. A signal ends all workers and leaves no partial
+/// output.
 ///
 /// The calling process must be single-threaded. Throws std::runtime_error if records, locks or folders cannot be
 /// written, and std::system_error if processes cannot be created; workers are ended before that.
