@@ -162,7 +162,7 @@ void addLimits(CLI::App& command, BatchArguments& a) {
     command
         .add_option("--large-memory", a.largeMemory,
                     "build a mesh alone, by all threads, if its build needs more memory than this by estimate [MiB]; "
-                    "default half of the machine's, divided by --threads")
+                    "default half of what the process may use, divided by --threads")
         ->check(mebibytes);
 }
 

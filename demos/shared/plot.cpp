@@ -15,7 +15,6 @@ namespace {
 
 // [pixels]
 constexpr double panelWidth = 620, panelHeight = 400, left = 70, right = 200, top = 44, bottom = 54;
-constexpr std::size_t maxInRow = 3;  // panels
 constexpr double labelSpacing = 34;  // min distance of labels at the ends of lines
 constexpr std::array colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0", "#b8860b", "#1b98a0", "#b0478c", "#5a5a5a"};
 
@@ -154,15 +153,13 @@ std::string drawn(const Panel& panel) {
 
 std::string svg(const std::vector<Panel>& panels) {
     if (panels.empty()) throw std::invalid_argument("a plot needs a panel");
-    const std::size_t inRow = std::min(panels.size(), maxInRow), rows = (panels.size() + inRow - 1) / inRow;
     std::string out = fmt::format(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:g} {1:g}\" width=\"{0:g}\" height=\"{1:g}\" "
         "font-family=\"DejaVu Sans, Helvetica, sans-serif\" font-size=\"12\" fill=\"#222\">\n"
         "<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"white\"/>\n",
-        panelWidth * double(inRow), panelHeight * double(rows));
+        panelWidth, panelHeight * double(panels.size()));
     for (std::size_t i = 0; i < panels.size(); ++i)
-        out += fmt::format("<g transform=\"translate({:g} {:g})\">\n{}</g>\n", panelWidth * double(i % inRow),
-                           panelHeight * double(i / inRow), drawn(panels[i]));
+        out += fmt::format("<g transform=\"translate(0 {:g})\">\n{}</g>\n", panelHeight * double(i), drawn(panels[i]));
     return out + "</svg>\n";
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plots as an SVG file: panels with labelled lines, up to three per row, either log-log with decades or linear with
+// Plots as an SVG file: panels with labelled lines, below each other, either log-log with decades or linear with
 // round steps.
 #pragma once
 

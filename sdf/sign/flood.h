@@ -25,7 +25,7 @@ class Progress;
 ///   proceeds in steps and never crosses the surface; outside wins a tie. Inside a closed gap the border is therefore
 ///   about half-way.
 /// - Voxels that neither region reaches are enclosed by triangles on all sides and are inside. A closed solid too thin
-///   for the ball is kept, and an open surface without thickness has no inside.
+///   for the ball is kept. An open surface has no inside without a place that is thicker than gap + 2 voxels.
 /// - Voxels within 1e-4 voxel of the surface that neither region reaches are outside.
 ///
 /// Face orientation does not matter. The bytes do not depend on the thread count. Throws std::invalid_argument as

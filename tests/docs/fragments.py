@@ -16,8 +16,7 @@ SYSTEM = ["/usr/include/bullet", "/usr/include/Imath"]
 
 
 def fragments(source):
-    pages = [source / "README.md", source / "docs/queries.md", source / "docs/tiles.md"]
-    for path in [*pages, *sorted(source.glob("docs/start/*.md")), *sorted(source.glob("docs/howto/*.md"))]:
+    for path in [source / "README.md", *sorted((source / "docs").rglob("*.md"))]:
         page = path.read_text()
         for block in blocks(page):
             if block.language == "cpp" and not block.file_name() and block.use in (None, "given"):

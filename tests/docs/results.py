@@ -123,6 +123,7 @@ def faults_of_tables(root, path):
 
 
 def faults(root):
+    root = root.resolve()
     docs = root / "docs"
     results = sorted((docs / "results").glob("*.md"))
     if not results:

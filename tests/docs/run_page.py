@@ -134,7 +134,7 @@ def main():
     if result.returncode:
         print(result.stdout)
         print(f"{options.page}: its commands end with {result.returncode}")
-        return result.returncode
+        return 1 if options.packages or options.checkout else result.returncode  # only the stand-in of sudo asks to skip
     status = 0
     for (command, shown), printed in zip(expected, outputs(result.stdout, expected), strict=True):
         if options.write:

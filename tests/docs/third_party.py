@@ -11,8 +11,10 @@ from pathlib import Path
 
 SKIPPED = 4
 INCLUDE = re.compile(r"^\s*#include <([^>$]+)>", re.M)
-FOLDERS = ["", "bullet", "c++/12", "x86_64-linux-gnu/c++/12", "x86_64-linux-gnu", "../lib/x86_64-linux-gnu/openmpi/include"]
-SYSTEM = {"libc6-dev", "libstdc++-12-dev", "linux-libc-dev"}
+FOLDERS = ["", "bullet", *(str(path.relative_to("/usr/include")) for pattern in ("c++/*", "*-linux-gnu", "*-linux-gnu/c++/*")
+                           for path in Path("/usr/include").glob(pattern)),
+           *(f"../lib/{path.relative_to('/usr/lib')}" for path in Path("/usr/lib").glob("*-linux-gnu/openmpi/include"))]
+SYSTEM = re.compile(r"libc6-dev|libstdc\+\+-\d+-dev|linux-libc-dev")
 LIBRARIES = ("sdf", "collider", "cl", "integration", "tools")
 ELSEWHERE = {"OpenCL ICD loader", "Open MPI", "pybind11"}  # not in the command line, or without a version in its headers
 
@@ -41,7 +43,7 @@ def headers(root, folders):
 
 def packages_of_headers(paths):
     result = subprocess.run(["dpkg", "-S", *paths], capture_output=True, text=True)
-    return {line.partition(":")[0] for line in result.stdout.splitlines()} - SYSTEM
+    return {line.partition(":")[0] for line in result.stdout.splitlines() if not SYSTEM.match(line)}
 
 
 def installed_by_run(root):

@@ -6,16 +6,19 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 build=$1
 report() { # PROFILE SOURCES...: lines of files and their total
-  llvm-cov-14 report "$build/fuzzer" --instr-profile="$1" --show-functions=false "${@:2}" 2>/dev/null
+  llvm-cov-14 report "$build/fuzzer" --instr-profile="$1" --show-functions=false "${@:2}"
 }
-total() { report "$@" | awk '/^TOTAL/ { print $10 }'; }  # of lines
+total() { report "$@" | awk '/^TOTAL/ { print $10; found = 1 } END { exit !found }'; }  # of lines, in LLVM 14's columns
 
 printf '%-14s %10s %10s %10s %10s\n' fuzzer sdf/mesh sdf/io sdf collider
 for folder in "$build"/profiles/*/; do
   name=$(basename "$folder")
   llvm-profdata-14 merge --output="$folder/all.profdata" "$folder"/*.profraw
   printf '%-14s' "$name"
-  for sources in sdf/mesh sdf/io sdf collider; do printf ' %10s' "$(total "$folder/all.profdata" $sources)"; done
+  for sources in sdf/mesh sdf/io sdf collider; do
+    share=$(total "$folder/all.profdata" $sources)
+    printf ' %10s' "$share"
+  done
   echo
 done
 llvm-profdata-14 merge --output="$build/all.profdata" "$build"/profiles/*/all.profdata

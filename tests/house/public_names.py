@@ -59,7 +59,8 @@ def initial(member):
 
 
 def words_before(member):
-    return [word for word in ("static", "explicit") if member.get(word) == "yes"]
+    virtual = ["virtual"] if member.get("virt") not in (None, "non-virtual") else []
+    return virtual + [word for word in ("static", "explicit") if member.get(word) == "yes"]
 
 
 def members_of(compound):
@@ -97,7 +98,8 @@ def names(build):
             continue
         if kind in ("struct", "class") and compound.get("prot") == "public":
             bases = [f"{base.get('prot')} {base.text}" for base in compound.findall("basecompoundref")]
-            lines.append(f"{kind} {name}" + (" : " + ", ".join(bases) if bases else ""))
+            final = " final" if compound.get("final") == "yes" else ""
+            lines.append(f"{kind} {name}{final}" + (" : " + ", ".join(bases) if bases else ""))
         lines += members_of(compound)
     return lines
 

@@ -324,7 +324,7 @@ CLI::Option* addTileOptions(CLI::App& command, TileArguments& a) {
                                      "build in tiles, as 4x4x2: -o is then a folder of one .vdb file a tile");
     a.memoryGiven = command
                         .add_option("--memory", a.memory,
-                                    "memory that a build in tiles may use [MiB], default all of the machine's")
+                                    "memory that a build in tiles may use [MiB], default all that the process may use")
                         ->check(CLI::Range(std::uint64_t(1), std::uint64_t(1) << 30))
                         ->needs(tiles);
     return tiles;
