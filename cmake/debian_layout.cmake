@@ -17,7 +17,7 @@ endforeach()
 # the time is that of SOURCE_DATE_EPOCH
 string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
 set(version ${CPACK_PACKAGE_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})
-set(changelog "bilayer (${version}) bookworm\; urgency=medium\n\n  * Version ${CPACK_PACKAGE_VERSION}.\n\n")
+set(changelog "bilayer (${version}) bookworm; urgency=medium\n\n  * Version ${CPACK_PACKAGE_VERSION}.\n\n")
 string(APPEND changelog " -- ${CPACK_PACKAGE_CONTACT}  ${date}\n")
 
 foreach(group IN ITEMS program development python)

@@ -46,7 +46,7 @@ build/consumer
 g++ -std=c++20 cube.cpp $(pkg-config --cflags --libs bilayer-sdf) -o cube
 ./cube
 
-echo "== the licence and the notices of what is compiled in"
+echo "== the licence, the notices of what is compiled in, and the changelog"
 python3 - <<'PYTHON'
 from pathlib import Path
 for package in ("bilayer", "libbilayer-dev", "python3-bilayer"):
@@ -54,6 +54,10 @@ for package in ("bilayer", "libbilayer-dev", "python3-bilayer"):
     missing = [notice.name for notice in sorted(Path("/notices").iterdir()) if notice.read_text() not in text]
     assert "Apache License" in text and not missing, f"the copyright of {package} lacks the notices of {missing}"
 PYTHON
+
+for package in bilayer libbilayer-dev python3-bilayer; do
+  zcat /usr/share/doc/$package/changelog.Debian.gz | grep -qx 'bilayer (.*) bookworm; urgency=medium'
+done
 
 echo "== the pages of docs/start"
 apt-get purge -y -qq bilayer libbilayer-dev python3-bilayer >/dev/null 2>&1
