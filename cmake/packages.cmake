@@ -75,7 +75,7 @@ foreach(package IN ITEMS libopenvdb-dev libboost-iostreams-dev libblosc-dev libt
     libfmt-dev libimath-dev zlib1g-dev libbullet-dev ocl-icd-opencl-dev opencl-clhpp-headers)
   execute_process(COMMAND dpkg-query --show --showformat=\${source:Upstream-Version} ${package} OUTPUT_VARIABLE version ERROR_QUIET)
   if(version MATCHES "^([0-9]+)\\.([0-9]+)")
-    list(APPEND depends "${package} (>= ${CMAKE_MATCH_1}.${CMAKE_MATCH_2})")
+    list(APPEND depends "${package} (>= ${CMAKE_MATCH_1}.${CMAKE_MATCH_2}~)")
     math(EXPR next_minor "${CMAKE_MATCH_2} + 1")
     if(package STREQUAL "libopenvdb-dev" OR package STREQUAL "libbullet-dev")
       list(APPEND depends "${package} (<< ${CMAKE_MATCH_1}.${next_minor}~)")

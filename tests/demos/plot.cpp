@@ -37,12 +37,12 @@ TEST_CASE("equal ratios are equal distances in a plot") {
         CHECK(svg.find(words) != std::string::npos);
 }
 
-TEST_CASE("a fourth panel begins another row") {
+TEST_CASE("panels of a plot stand below each other") {
     const demo::Panel panel{"t", "x", "y", {}, {{"a", {1, 10}, {1, 10}}}};
-    CHECK(demo::svg({panel, panel, panel}).find("viewBox=\"0 0 1860 400\"") != std::string::npos);
-    const std::string svg = demo::svg({panel, panel, panel, panel});
-    CHECK(svg.find("viewBox=\"0 0 1860 800\"") != std::string::npos);
+    const std::string svg = demo::svg({panel, panel, panel});
+    CHECK(svg.find("viewBox=\"0 0 620 1200\"") != std::string::npos);
     CHECK(svg.find("translate(0 400)") != std::string::npos);
+    CHECK(svg.find("translate(0 800)") != std::string::npos);
 }
 
 TEST_CASE("a plot is written to a file, or the file is named") {
