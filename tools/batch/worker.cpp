@@ -64,7 +64,7 @@ void resetPeakMemory() {
     ::close(file);
 }
 
-// Pages that the kernel takes back have to be filled again by the next task, which takes longer than a small build.
+// Pages that the kernel takes back have to be filled again by the next task. That takes longer than a small build.
 void keepFreeMemory() {
     ::mallopt(M_MMAP_THRESHOLD, keptMemory / 2);
     ::mallopt(M_TRIM_THRESHOLD, keptMemory);
