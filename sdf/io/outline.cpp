@@ -51,6 +51,11 @@ bool reverses(const glm::dvec2& p, const glm::dvec2& q, const glm::dvec2& r) {
     return dotOf(p - q, r - q) > 0 && lineSide(p, q, r) == 0;
 }
 
+// Returns whether p lies between two other points of the same line.
+bool isBetween(const glm::dvec2& a, const glm::dvec2& p, const glm::dvec2& b) {
+    return dotOf(a - p, b - p) < 0;
+}
+
 // Compares directions from a point by their angles from a first one, counter-clockwise.
 class AngleOrder {
   public:
@@ -113,7 +118,7 @@ void Outline::reset(std::span<const glm::dvec2> points) {
     corners_.resize(left_);
     obstacles_.reset(points);
     for (unsigned i = 0; i < left_; ++i)
-        corners_[i] = {points[i], i > 0 ? i - 1 : left_ - 1, i + 1 < left_ ? i + 1 : 0, true, true, false};
+        corners_[i] = {points[i], i > 0 ? i - 1 : left_ - 1, i + 1 < left_ ? i + 1 : 0, true, true, false, i};
     for (unsigned i = 0; i < left_; ++i) classify(i);
     wasConvex_ = std::all_of(corners_.begin(), corners_.end(), [](const Corner& corner) { return corner.convex; }) &&
                  turnsOnce(points);
@@ -165,7 +170,7 @@ void Outline::narrow(unsigned at, unsigned v, unsigned to) {
         corner.full = false;
 }
 
-bool Outline::isPinched(unsigned v, unsigned w) const {
+bool Outline::isPinched(unsigned v, unsigned w) {
     const Corner &corner = corners_[v], &other = corners_[w];
     if (v == w || !corner.present || !other.present || corner.after == w || other.after == v) return false;
     const AngleOrder order(corner.at, corners_[corner.after].at);
@@ -174,8 +179,43 @@ bool Outline::isPinched(unsigned v, unsigned w) const {
     if (order.isZero(out) || order.isLess(out, in)) return false;
     if (!order.isLess(in, out) && !other.full) return false;
     if (order.isZero(end)) return corner.full;
-    // if w runs along both edges of v, this point does not show on which side
-    return order.isLess(out, end) || (!order.isLess(end, out) && !order.isZero(in));
+    if (order.isLess(out, end)) return true;
+    return !order.isLess(end, out) && (!order.isZero(in) || leavesInside(v, w));
+}
+
+// For a corner w that runs along both edges of a corner v, the other way: follows the outline from w on and from v back
+// to the place where they part. Returns whether w leaves on the inner side of v there. If not, all pairs of corners on
+// the way remember it, so that a slit with many corners is followed once.
+bool Outline::leavesInside(unsigned v, unsigned w) {
+    way_.clear();
+    glm::dvec2 at = corners_[v].at;
+    while (corners_[v].acrossSlit != w && way_.size() < corners_.size()) {
+        way_.emplace_back(v, w);
+        const glm::dvec2 from = at, &p = corners_[corners_[v].before].at, &q = corners_[corners_[w].after].at;
+        at = isBetween(from, q, p) ? q : p;
+        if (at == p) v = corners_[v].before;
+        if (at == q) w = corners_[w].after;
+        const int side = leavingSide(v, w, at, from);
+        if (side > 0) return true;
+        if (side < 0) break;
+    }
+    for (const auto& [a, b] : way_) {
+        corners_[a].acrossSlit = b;
+        corners_[b].acrossSlit = a;
+    }
+    return false;
+}
+
+// The outline leaves a point by a corner w and arrives there by a corner v; both meet the same line from there. Returns
+// 1 if w leaves on the inner side of v, -1 if it does on the outer side, and 0 if both run along each other further.
+int Outline::leavingSide(unsigned v, unsigned w, const glm::dvec2& at, const glm::dvec2& from) const {
+    const Corner &corner = corners_[v], &other = corners_[w];
+    const glm::dvec2 &end = corners_[corner.before].at, &out = corners_[other.after].at;
+    const AngleOrder order(at, from);
+    if (v == w) return corner.full ? -1 : 1;
+    if (order.isZero(end)) return corner.full ? 1 : -1;
+    if (order.isZero(out)) return other.full ? 1 : -1;
+    return int(order.isLess(out, end)) - int(order.isLess(end, out));
 }
 
 bool Outline::isEmpty(unsigned v) const {

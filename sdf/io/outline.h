@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <glm/vec2.hpp>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "sdf/io/point_tree.h"
@@ -29,7 +30,8 @@ class Outline {
         glm::dvec2 at;
         unsigned before, after;
         bool present, convex;
-        bool full;  ///< its interior angle is 360 degrees
+        bool full;            ///< its interior angle is 360 degrees
+        unsigned acrossSlit;  ///< a corner on the other side of the same slit, or itself
     };
 
     /// Starts with the corners of one ring.
@@ -48,7 +50,7 @@ class Outline {
     bool isEmpty(unsigned v) const;
     /// Returns whether two corners at the same point can be joined within the outline: the corner w arrives and leaves,
     /// in this order, between the edges of v, on the inner side.
-    bool isPinched(unsigned v, unsigned w) const;
+    bool isPinched(unsigned v, unsigned w);
 
     /// Joins the neighbours of a corner, and removes it. The neighbours must be classified again.
     void cut(unsigned v);
@@ -65,9 +67,12 @@ class Outline {
     void findFullAngles(std::span<const glm::dvec2> points);
     void narrow(unsigned at, unsigned v, unsigned to);
     bool isOutward(unsigned v) const;
+    bool leavesInside(unsigned v, unsigned w);
+    int leavingSide(unsigned v, unsigned w, const glm::dvec2& at, const glm::dvec2& from) const;
 
     std::vector<Corner> corners_;
-    PointTree obstacles_;  ///< corners that are not convex
+    PointTree obstacles_;                             ///< corners that are not convex
+    std::vector<std::pair<unsigned, unsigned>> way_;  ///< pairs of corners that leavesInside() passed
     unsigned left_ = 0;
     bool wasConvex_ = false;
 };

@@ -250,6 +250,22 @@ inline Outline spiral(int turns) {
     return inner;
 }
 
+// A square with a slit without thickness that winds from its corner to its centre.
+inline Outline slit(int corners) {
+    Outline way{{0, 0}};
+    for (int i = 1; i < corners; ++i) {
+        const int length = (i + 1) / 2;
+        const Point& last = way.back();
+        way.push_back(i % 2 ? Point{last.x + (i % 4 == 1 ? length : -length), last.y}
+                            : Point{last.x, last.y + (i % 4 == 2 ? length : -length)});
+    }
+    Outline outline{
+        {-corners, -corners}, {corners, -corners}, {corners, corners}, {-corners, corners}, {-corners, -corners}};
+    outline.insert(outline.end(), way.rbegin(), way.rend());
+    outline.insert(outline.end(), way.begin() + 1, way.end());
+    return outline;
+}
+
 // Adds corners at random places of the edges with integer coordinates.
 inline Outline withStraightCorners(const Outline& outline, std::mt19937& random) {
     Outline result;

@@ -196,6 +196,7 @@ TEST_CASE("combs and spirals of many corners are cut exactly") {
     check(Squares(30000, true, random).outline(0.5, random), random);
     check(Squares(30000, false, random).outline(1, random), random);
     check(star(100000, 1 << 20, random), random);
+    check(slit(30000), random);
 }
 
 TEST_CASE("repeated corners and edges out and back cost a triangle without area each") {
@@ -226,6 +227,8 @@ TEST_CASE("outlines that touch themselves are cut exactly") {
     checkTouching({{0, 0}, {1, 0}, {1, 1}, {2, 1}, {2, 2}, {1, 2}, {1, 1}, {0, 1}}, random);  // two squares
     checkTouching({{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}}, random);                          // a notch to an edge
     checkTouching({{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0}, {1, 2}, {2, 1}}, random);          // a hole at a corner
+    // two triangles that are joined by an edge both ways, around a corner
+    checkTouching({{1, 1}, {1, 0}, {2, 1}, {0, 1}, {1, 2}, {2, 2}, {2, 1}, {3, 2}, {1, 2}, {0, 1}}, random);
     for (int i = 0; i < 3000; ++i) {
         CAPTURE(i);
         const int size = 2 + i % 3, triangles = 2 + int(random() % unsigned(2 * size * size));
