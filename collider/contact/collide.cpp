@@ -93,8 +93,9 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
             return facesEdgeObliquely(body.pose.toWorld(body.scale * point.position), own,
                                       sample.distance * other.scale, normal, holdsAt);
         };
-        return passesNormalFilter(options, normal, own, body.motion.rotation - other.motion.rotation,
-                                  sample.distance > 0 && !point.isSharp, facesEdge);
+        const bool isSeparated = sample.distance > -minFaceDepth * other.collider.field().voxelSize() && !point.isSharp;
+        return passesNormalFilter(options, normal, own, body.motion.rotation - other.motion.rotation, isSeparated,
+                                  facesEdge);
     };
     // points are fixed to their body, places between them are not
     const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {

@@ -164,8 +164,8 @@ class PointsOnConvex {
         float approach = local_.approach(position, normal, body_.options.margin);
         if (nearest.distance > 0 && approach > 0 && isGrazing(position, point)) approach = 0;
         // A curved surface has no edge that a point could face obliquely.
-        const bool isSeparated =
-            nearest.distance > 0 && !point.isSharp && !convex_.isRound(nearest) && !body_.options.exact;
+        const bool isSeparated = nearest.distance > -minFaceDepth * body_.voxel && !point.isSharp &&
+                                 !convex_.isRound(nearest) && !body_.options.exact;
         const auto facesEdge = [&] {
             const auto holdsAt = [&](const glm::vec3& place, auto&& test) { return test(body_.nearest(place).normal); };
             return facesEdgeObliquely(body_.intoConvex(position), body_.toConvex * point.normal, nearest.distance,

@@ -11,6 +11,7 @@
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
 #include "collider/contact/collider_data.h"
+#include "collider/contact/normal_filter.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -45,7 +46,8 @@ TEST_CASE("contacts with normals along the surface of their point are filtered o
             const bool ofB = contact.feature & featureOfB;
             const SurfacePoint point = pointOf((ofB ? b : a).collider, contact.feature & ~featureOfB);
             const float cosine = glm::dot((ofB ? b : a).pose.rotation * point.normal, contact.normal);
-            const float least = contact.distance > 0 && !point.isSharp ? std::max(apart, 0.3f) : 0.3f;
+            const bool isSeparated = contact.distance > -minFaceDepth * h && !point.isSharp;
+            const float least = isSeparated ? std::max(apart, 0.3f) : 0.3f;
             return (ofB ? cosine : -cosine) >= least;
         };
         std::set<std::uint32_t> sunk;  // convex vertices that may be pushed back along their entry path
@@ -71,7 +73,7 @@ TEST_CASE("contacts with normals along the surface of their point are filtered o
             if (left.contains(contact.feature)) continue;
             const bool ofB = contact.feature & featureOfB;
             const SurfacePoint point = pointOf((ofB ? b : a).collider, contact.feature & ~featureOfB);
-            REQUIRE(contact.distance > 0);
+            REQUIRE(contact.distance > -minFaceDepth * h);
             REQUIRE_FALSE(point.isSharp);
             REQUIRE(std::abs(glm::dot((ofB ? b : a).pose.rotation * point.normal, contact.normal)) < 0.99997f);
             ++oblique;
@@ -98,4 +100,35 @@ TEST_CASE("convex vertices in contact are pushed apart along their entry directi
         }
     }
 }
+
+TEST_CASE("a face point that touches an edge makes no oblique contact") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Collider ground(shapes::box({1, 1, 0.1f}), levelSetOf(boxSolid({1, 1, 0.1}), h));
+    const auto points = ground.data().points().points();
+    int tested = 0;
+    for (int i = 0; i < 10000; ++i) {
+        const SurfacePoint& point = points[std::size_t(random(0, 1) * double(points.size() - 1))];
+        if (point.isSharp || point.normal.z < 0.99f || glm::length(point.position) > 0.3f) continue;
+        // the brick stands on the ground, and its lower edge along y passes over the point
+        const glm::quat rotation = glm::angleAxis(float(random(0, 2 * glm::pi<double>())), glm::vec3(0, 0, 1));
+        const float depth = random(0, 1) < 0.5 ? 0 : std::pow(10.f, -float(random(4, 8)));
+        const glm::vec3 onEdge(0.3f + depth * random(-2, 2), random(-0.1, 0.1), -0.1f);
+        const Pose pose{point.position - rotation * onEdge - glm::vec3(0, 0, depth), rotation};
+        for (const bool swapped : {false, true}) {
+            CAPTURE(i, depth, swapped);
+            std::vector<Contact> found;
+            if (swapped)
+                collide(ground, {}, brick(), pose, {.margin = 0.1f * h}, found);
+            else
+                collide(brick(), pose, ground, {}, {.margin = 0.1f * h}, found);
+            REQUIRE(!found.empty());
+            for (const Contact& contact : found) REQUIRE(std::abs(contact.normal.z) > 0.99f);
+        }
+        ++tested;
+    }
+    CHECK(tested > 100);
+}
+
 }  // namespace bilayer::normal_filter_test
