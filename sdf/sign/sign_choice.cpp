@@ -83,7 +83,7 @@ std::string unionReason(const UnionSurface& united) {
 }
 
 std::string repairedReason(const std::string& reasonOfNormals, std::size_t voxels) {
-    return fmt::format("{}, but the surface intersects itself; {} voxels have the side of their winding number",
+    return fmt::format("{}, but the surface touches or intersects itself; {} voxels have the side of their winding number",
                        reasonOfNormals, voxels);
 }
 
@@ -142,7 +142,7 @@ SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress) {
 
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress) {
     const char* trouble =
-        hasFacesBackToBack(mesh, progress) ? "faces lie back to back" : "the surface intersects itself";
+        hasFacesBackToBack(mesh, progress) ? "faces lie back to back" : "the surface touches or intersects itself";
     return chooseFor(orient(mesh, progress), fmt::format("closed and oriented, but {}", trouble), progress);
 }
 

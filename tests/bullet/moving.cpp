@@ -191,12 +191,12 @@ TEST_CASE("Cloth and soft balls come to rest on a field as on its triangles") {
 }
 
 TEST_CASE("Continuous collision passes over soft bodies, which are no shapes of its surfaces") {
-    Shape ball(exactSphere(0.2f, h));
+    Shape block(exactBox(glm::vec3(0.2f), h));
     SoftWorld world;
     const bullet::WorldExtensions extensions(world.dynamics);
     world.soft.reset(btSoftBodyHelpers::CreateEllipsoid(world.info(), {0, 0, 0}, {0.3f, 0.3f, 0.3f}, 50));
     world.dynamics.addSoftBody(world.soft.get());
-    world.lay(ball, {0, 0, 1}, 1);
+    world.lay(block, {0, 0, 1}, 1);
     world.body->setLinearVelocity({0, 0, -400});
     for (int i = 0; i < 4; ++i) world.dynamics.stepSimulation(step, 1, step);
     CHECK(world.body->getWorldTransform().getOrigin().z() < 0);
