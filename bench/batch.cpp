@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <map>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -97,6 +97,7 @@ class BatchBench {
     void round() {
         batch("batch, 1 core", 1);
         batch(fmt::format("batch, {} cores", options_.threads), options_.threads);
+        separate(fmt::format("{} batches of a shard each at once, 1 core", options_.threads));
         batch(fmt::format("batch, {} cores, all up to date", options_.threads), options_.threads, /*isAgain=*/true);
         loop("loop of build, all threads", options_.threads);
         loop("loop of build, 1 thread", 1);
@@ -125,17 +126,36 @@ class BatchBench {
         return found != conversions_.end() ? *found : conversions_.emplace_back(Conversion{name, {}, {}});
     }
 
+    Words batchCommand(const fs::path& output, int threads) const {
+        return {options_.bilayer,        "batch",        "--tree",    scratch_ / "library", "-o", output, "--threads",
+                std::to_string(threads), "--resolution", resolution()};
+    }
+
     std::string resolution() const { return std::to_string(options_.resolution); }
 
     void batch(const std::string& name, int threads, bool isAgain = false) {
         const fs::path output = scratch_ / "fields";
         if (!isAgain) fs::remove_all(output);
-        const double seconds = timed({options_.bilayer, "batch", "--tree", scratch_ / "library", "-o", output,
-                                      "--threads", std::to_string(threads), "--resolution", resolution()},
-                                     scratch_);
+        const double seconds = timed(batchCommand(output, threads), scratch_);
         Conversion& conversion = of(name);
         conversion.seconds.push_back(seconds);
         if (threads == 1) conversion.overhead.push_back((seconds - buildSeconds(output)) / options_.meshes);
+    }
+
+    // Programs that share nothing: the bound that this machine sets to a batch on as many cores.
+    void separate(const std::string& name) {
+        const fs::path output = emptied("separate");
+        std::vector<std::future<double>> shards;
+        for (int i = 1; i <= options_.threads; ++i) {
+            const fs::path own = output / std::to_string(i);
+            fs::create_directories(own);
+            Words words = batchCommand(own / "fields", 1);
+            words.insert(words.end(), {"--shard", fmt::format("{}/{}", i, options_.threads)});
+            shards.push_back(std::async(std::launch::async, [=] { return timed(words, own); }));
+        }
+        double longest = 0;
+        for (auto& shard : shards) longest = std::max(longest, shard.get());
+        of(name).seconds.push_back(longest);
     }
 
     void loop(const std::string& name, int threads) {

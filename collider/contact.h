@@ -90,8 +90,8 @@ struct ContactOptions {
     /// its own normal, if that is outside. Vertices of a cube, whose normals average three faces, reach 0.57. Below -1:
     /// no contact is dropped.
     float minNormalCosine = 0.3f;
-    /// The same limit for face points that do not touch yet, or are less than a thousandth of a voxel deep. A point next
-    /// to the other body sees its edge obliquely, or approaches its side, and would be blocked there.
+    /// The same limit for face points that do not touch yet, or are less than a thousandth of a voxel deep. A point
+    /// next to the other body sees its edge obliquely, or approaches its side, and would be blocked there.
     float minNormalCosineApart = 0.9f;
     /// Whether face points that do not touch yet keep contacts with edges that they see at more than half a degree off
     /// their normal. Such contacts are redundant: the edges' own points meet the faces perpendicularly.

@@ -15,8 +15,8 @@ namespace bilayer::detail {
 /// Points that slide along a face hit the edges beyond it by rounding. Hits shallower than this are ignored [voxels].
 inline constexpr float grazingTolerance = 0.25f;
 
-/// A face point that is less deep in the other body counts as separated: a point that touches an edge gets the normal of
-/// one of the edge's sides, or one between them, by rounding [voxels].
+/// A face point that is less deep in the other body counts as separated: a point that touches an edge gets the normal
+/// of one of the edge's sides, or one between them, by rounding [voxels].
 inline constexpr float minFaceDepth = 1e-3f;
 
 /// Where the path of a surface point starts that tests whether the point only grazes another surface: slightly inside

@@ -146,6 +146,10 @@ std::vector<SurfaceBlock> enter(FieldLayout& field, const openvdb::FloatGrid& gr
 void FieldFrame::requireSize() const {
     if (double(blocks.x) * blocks.y * blocks.z > double(maxBlocks))
         throw std::invalid_argument("the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
+    requireLength();
+}
+
+void FieldFrame::requireLength() const {
     if (std::max({blocks.x, blocks.y, blocks.z}) > maxBlocksAlong) throwTooLong();
 }
 

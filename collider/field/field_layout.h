@@ -50,6 +50,8 @@ struct FieldFrame {
     static constexpr int maxBlocksAlong = 1 << 19;
     /// Throws std::invalid_argument if the directory has more than 2^26 entries, or more than 2^19 along an axis.
     void requireSize() const;
+    /// Throws std::invalid_argument if the directory has more than 2^19 entries along an axis.
+    void requireLength() const;
 
     /// Whether the band is wide enough to locate the surface.
     bool findsSurface() const;

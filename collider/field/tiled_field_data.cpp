@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "collider/field/tiled_field_data.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -13,6 +16,7 @@
 #include "collider/field/outer_bound.h"
 #include "collider/field/surface_file.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/grid/distance_check.h"
 #include "sdf/grid/vdb_grids.h"
 
 namespace bilayer::detail {
@@ -31,6 +35,26 @@ bool overlap(const PlacedTile& a, const PlacedTile& b, int margin) {
     const glm::ivec3 reach(margin);
     return glm::all(glm::lessThan(a.first - reach, b.first + blockEdgeVoxels * b.blocks)) &&
            glm::all(glm::lessThan(b.first, a.first + blockEdgeVoxels * a.blocks + reach));
+}
+
+/// The grids of a tile's file, checked as those of a whole field are.
+TileGrids gridsOf(const TileRecord& tile) {
+    tile.field.requireIntact();
+    TileGrids read = readTile(tile.field.path);
+    try {
+        if (tile.hasBand) requireValidDistances(LevelSet(read.grids));
+    } catch (const std::invalid_argument& error) {
+        throw std::runtime_error(fmt::format("{}: {}", tile.field.path.string(), error.what()));
+    }
+    return read;
+}
+
+void requireWithin(const TileRecord& tile, std::span<const SurfaceBlock> blocks) {
+    const auto isWithin = [&](const SurfaceBlock& block) {
+        return tile.box.contains(block.first) && (block.first - tile.box.first) % blockEdgeVoxels == glm::ivec3(0);
+    };
+    if (!std::all_of(blocks.begin(), blocks.end(), isWithin))
+        throw std::runtime_error(fmt::format("{}: has a block that is not in its tile", tile.cells.path.string()));
 }
 
 }  // namespace
@@ -56,6 +80,7 @@ void TiledFieldData::readSurface() {
         if (!record.cells.path.empty()) {
             record.cells.requireIntact();
             readSurfaceBlocks(record.cells.path, surface_);
+            requireWithin(record, std::span(surface_).subspan(before));
         }
         placed_.push_back(
             {.first{}, .blocks{}, .lower{}, .upper{}, .shift{}, .surface = before, .surfaceEnd = surface_.size()});
@@ -75,8 +100,7 @@ void TiledFieldData::readFrame() {
         upper = glm::max(upper, record.band.end - 1);
     }
     if (!smallest || surface_.empty()) throw std::invalid_argument("the field in tiles has no voxel in its band");
-    manifest_.tiles[*smallest].field.requireIntact();
-    const LevelSet tile(readTile(manifest_.tiles[*smallest].field.path).grids);
+    const LevelSet tile(gridsOf(manifest_.tiles[*smallest]).grids);
     const openvdb::FloatGrid& grid = *tile.grids().distance;
     const auto placeOf = [&](const glm::ivec3& voxel) {
         const openvdb::Vec3d p = grid.indexToWorld(openvdb::Coord(voxel.x, voxel.y, voxel.z));
@@ -94,6 +118,7 @@ void TiledFieldData::readFrame() {
     frame_.exteriorWidth = tile.exteriorWidth();
     frame_.interiorWidth = tile.interiorWidth();
     frame_.blocks = (end - first_) / blockEdgeVoxels;
+    frame_.requireLength();
     frame_.origin = placeOf(first_);
     frame_.bounds = {glm::vec3(placeOf(lower)), glm::vec3(placeOf(upper))};
     fixedOffset_ = FieldData::fixedPoint - frame_.origin * frame_.perMetre;
@@ -167,8 +192,11 @@ std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
         grid->setTransform(openvdb::math::Transform::createLinearTransform(frame_.voxel));
         grids.distance = grid;
     } else {
-        record.field.requireIntact();
-        const TileGrids read = readTile(record.field.path);
+        const TileGrids read = gridsOf(record);
+        if (read.grids->distance->voxelSize()[0] != frame_.voxel)
+            throw std::runtime_error(fmt::format("{}: has voxels of {:g} m, and other tiles have voxels of {:g} m",
+                                                 record.field.path.string(), read.grids->distance->voxelSize()[0],
+                                                 frame_.voxel));
         const auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(read.grids->distance);
         addBorder(grid->tree(), read.border->tree());
         grids.distance = grid;

@@ -83,8 +83,9 @@ std::string unionReason(const UnionSurface& united) {
 }
 
 std::string repairedReason(const std::string& reasonOfNormals, std::size_t voxels) {
-    return fmt::format("{}, but the surface touches or intersects itself; {} voxels have the side of their winding number",
-                       reasonOfNormals, voxels);
+    return fmt::format(
+        "{}, but the surface touches or intersects itself; {} voxels have the side of their winding number",
+        reasonOfNormals, voxels);
 }
 
 bool balanced(const Mesh& mesh, Progress* progress) {

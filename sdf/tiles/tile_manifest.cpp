@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
+#include <glm/vector_relational.hpp>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "sdf/base/quoted_text.h"
 #include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
 
@@ -15,8 +18,17 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr int maxCoordinate = 1 << 29;  // of voxels, so that sums and differences fit into 32 bits
+
+int whole(const Json& json) {
+    if (!json.is_number_integer() || !(std::abs(json.get<double>()) <= maxCoordinate))
+        throw std::runtime_error(
+            fmt::format("{} stands where a whole number up to {} belongs", quotedWord(json.dump()), maxCoordinate));
+    return json.get<int>();
+}
+
 glm::ivec3 triple(const Json& json) {
-    return {json.at(0).get<int>(), json.at(1).get<int>(), json.at(2).get<int>()};
+    return {whole(json.at(0)), whole(json.at(1)), whole(json.at(2))};
 }
 
 // A box whose last voxels are included.
@@ -27,14 +39,53 @@ BlockBox boxOf(const Json& json) {
 TileRecord recordOf(const Json& json, const std::filesystem::path& folder) {
     TileRecord record{.box = boxOf(json), .field{}, .cells{}};
     if (json.at("file").is_null()) {
-        record.inside = json.at("side").get<std::string>() == "inside";
-        return record;
+        const auto side = json.at("side").get<std::string>();
+        record.inside = side == "inside";
+        if (record.inside || side == "outside") return record;
+        throw std::runtime_error(
+            fmt::format("the side of a tile is {}, and must be 'inside' or 'outside'", quotedWord(side)));
     }
     record.field = {folder / json.at("file").get<std::string>(), json.at("hash").get<std::string>()};
     record.cells = {folder / json.at("cells").get<std::string>(), json.at("cellsHash").get<std::string>()};
     record.hasBand = !json.at("band").is_null();
     if (record.hasBand) record.band = boxOf(json.at("band"));
     return record;
+}
+
+bool isWithin(const BlockBox& inner, const BlockBox& outer) {
+    return glm::all(glm::lessThan(inner.first, inner.end)) && outer.contains(inner.first) &&
+           outer.contains(inner.end - 1);
+}
+
+// Whether a tile begins on whole blocks where the tile before it ends, as all tiles at the same place along an axis do.
+bool isInLine(const TileManifest& manifest, const glm::ivec3& place, int axis) {
+    glm::ivec3 same(0), before = place;
+    same[axis] = place[axis];
+    --before[axis];
+    const BlockBox &box = manifest.tiles[manifest.at(place)].box, &line = manifest.tiles[manifest.at(same)].box;
+    return box.first[axis] == line.first[axis] && box.end[axis] == line.end[axis] && box.first[axis] % blockSide == 0 &&
+           box.end[axis] % blockSide == 0 &&
+           (place[axis] == 0 || box.first[axis] == manifest.tiles[manifest.at(before)].box.end[axis]);
+}
+
+void requireOrder(const TileManifest& manifest) {
+    const glm::ivec3& counts = manifest.counts;
+    if (glm::any(glm::lessThan(counts, glm::ivec3(1))) ||
+        double(counts.x) * counts.y * counts.z != double(manifest.tiles.size()))
+        throw std::runtime_error(fmt::format("it has {} tiles, but states {} x {} x {}", manifest.tiles.size(),
+                                             counts.x, counts.y, counts.z));
+    glm::ivec3 place(0);
+    for (place.x = 0; place.x < counts.x; ++place.x)
+        for (place.y = 0; place.y < counts.y; ++place.y)
+            for (place.z = 0; place.z < counts.z; ++place.z) {
+                const TileRecord& tile = manifest.tiles[manifest.at(place)];
+                if (!isWithin(tile.box, tile.box) || (tile.hasBand && !isWithin(tile.band, tile.box)) ||
+                    !isInLine(manifest, place, 0) || !isInLine(manifest, place, 1) || !isInLine(manifest, place, 2))
+                    throw std::runtime_error(fmt::format(
+                        "tile {} {} {} does not follow the tiles before it, on whole blocks of {} voxels, or does not "
+                        "hold its band",
+                        place.x, place.y, place.z, blockSide));
+            }
 }
 
 }  // namespace
@@ -59,13 +110,10 @@ TileManifest readTileManifest(const std::filesystem::path& folder) {
         const Json& origin = json.at("mesh").at("origin");
         manifest.origin = {origin.at(0).get<double>(), origin.at(1).get<double>(), origin.at(2).get<double>()};
         for (const Json& tile : json.at("tiles")) manifest.tiles.push_back(recordOf(tile, folder));
-    } catch (const Json::exception& error) {
-        throw std::runtime_error(fmt::format("{}: is no manifest ({})", path.string(), error.what()));
+        requireOrder(manifest);
+    } catch (const std::exception& error) {
+        throw std::runtime_error(fmt::format("{}: is no manifest of tiles ({})", path.string(), oneLine(error.what())));
     }
-    const glm::dvec3 counts(manifest.counts);
-    if (!(counts.x * counts.y * counts.z == double(manifest.tiles.size())) || manifest.tiles.empty())
-        throw std::runtime_error(fmt::format("{}: has {} tiles, but states {} x {} x {}", path.string(),
-                                             manifest.tiles.size(), counts.x, counts.y, counts.z));
     return manifest;
 }
 

@@ -60,6 +60,8 @@ void checkBuild(Bytes recipe);
 void checkVdb(Bytes file);
 /// The same for a valid file of which metadata entries and values are edited.
 void checkVdbEntries(Bytes edits);
+/// Opens a field in tiles of which the manifest and the lists of surface blocks are edited, and queries it.
+void checkTiles(Bytes edits);
 /// Queries, rays and casts with arbitrary floats.
 void checkQueries(Bytes numbers);
 /// collide(), distance() and timeOfImpact() for arbitrary poses and scales.

@@ -99,6 +99,10 @@ TEST_CASE("fields with edited entries and voxels are refused or can be queried")
     replay("vdb_entries", 200);
 }
 
+TEST_CASE("edited fields in tiles are refused or can be queried") {
+    replay("tiles", 300);
+}
+
 TEST_CASE("queries with any numbers have valid answers") {
     replay("queries", 1000);
 }

@@ -10,9 +10,11 @@
 
 #include <bilayer/collider/collider.h>
 #include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/fuzz/checks.h"
 #include "tests/support/support.h"
 
@@ -118,11 +120,8 @@ void append(std::string& bytes, Value value) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-std::string glb() {
-    std::string text = gltfText(false), binary;
+std::string glb(std::string text, const std::string& binary) {
     text.resize((text.size() + 3) / 4 * 4, ' ');
-    for (const float x : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) append(binary, x);
-    binary += raw("\0\1\2\0");
     std::string file = "glTF";
     append(file, std::uint32_t(2));
     append(file, std::uint32_t(12 + 8 + text.size() + 8 + binary.size()));
@@ -132,21 +131,72 @@ std::string glb() {
     return file + raw("BIN\0") + binary;
 }
 
+std::string triangleGlb() {
+    std::string binary;
+    for (const float x : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) append(binary, x);
+    return glb(gltfText(false), binary + raw("\0\1\2\0"));
+}
+
+/// A skinned strip, a fan of quantised positions, two scenes and a turned node.
+std::string skinnedGlb() {
+    const char* const text =
+        R"({"asset":{"version":"2.0"},"extensionsUsed":["KHR_mesh_quantization","KHR_materials_unlit"],)"
+        R"("extensionsRequired":["KHR_mesh_quantization"],"scene":1,"scenes":[{"nodes":[1]},{"nodes":[0,1]}],)"
+        R"("nodes":[{"mesh":0,"skin":0},{"mesh":1,"rotation":[0,0,1,0],"scale":[1,-2,1],"translation":[0,0,1]}],)"
+        R"("skins":[{"joints":[1,0],"inverseBindMatrices":4}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,)"
+        R"("JOINTS_0":2,"WEIGHTS_0":3},"indices":1,"mode":5}]},{"primitives":[{"attributes":{"POSITION":5},"mode":6}]}],)"
+        R"("accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
+        R"({"bufferView":1,"componentType":5123,"count":4,"type":"SCALAR"},)"
+        R"({"bufferView":2,"componentType":5121,"count":4,"type":"VEC4"},)"
+        R"({"bufferView":3,"componentType":5121,"normalized":true,"count":4,"type":"VEC4"},)"
+        R"({"bufferView":4,"componentType":5126,"count":2,"type":"MAT4"},)"
+        R"({"bufferView":5,"componentType":5122,"normalized":true,"count":4,"type":"VEC3"}],)"
+        R"("bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":8},)"
+        R"({"buffer":0,"byteOffset":56,"byteLength":16},{"buffer":0,"byteOffset":72,"byteLength":16},)"
+        R"({"buffer":0,"byteOffset":88,"byteLength":128},{"buffer":0,"byteOffset":216,"byteLength":32,"byteStride":8}],)"
+        R"("buffers":[{"byteLength":248}]})";
+    std::string binary;
+    for (const float x : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 1.f, 1.f, 1.f}) append(binary, x);
+    for (const std::uint16_t index : {0, 1, 2, 3}) append(binary, index);
+    binary += raw("\0\1\0\0\1\0\0\0\0\1\0\0\1\0\0\0");
+    binary += raw("\xff\0\0\0\x80\x7f\0\0\xff\0\0\0\xff\0\0\0");
+    for (int i = 0; i < 32; ++i) append(binary, i % 16 % 5 == 0 ? 1.f : 0.f);
+    for (int i = 0; i < 16; ++i) append(binary, std::int16_t(i * i * 1000));
+    return glb(text, binary);
+}
+
 Seeds gltfSeeds() {
-    return {gltfText(true), glb()};
+    return {gltfText(true), triangleGlb(), skinnedGlb()};
+}
+
+/// A dense array of distances, clamped to the band, as other programs write it.
+openvdb::FloatGrid::Ptr denseGrid(const LevelSet& levelSet) {
+    const openvdb::FloatGrid::Ptr grid = levelSet.grids().distance->deepCopy();
+    grid->removeMeta(metadata::interiorWidth);
+    grid->removeMeta(metadata::version);
+    for (auto leaf = grid->tree().beginLeaf(); leaf; ++leaf) leaf->setValuesOn();
+    return grid;
 }
 
 Seeds vdbSeeds() {
-    const Mesh mesh = shapes::box({0.2f, 0.15f, 0.1f});
-    const LevelSet plain = build(mesh, {.voxelSize = 0.2f, .exteriorWidthVoxels = 1, .interiorWidthVoxels = 1});
+    Mesh mesh = shapes::box({0.2f, 0.15f, 0.1f});
+    const BuildOptions options{.voxelSize = 0.2f, .exteriorWidthVoxels = 1, .interiorWidthVoxels = 1};
+    const LevelSet plain = build(mesh, options);
+    mesh.origin = {5e6, 1e5, -200};
+    const LevelSet far = build(mesh, options);
     const std::filesystem::path path = scratch("seed.vdb");
     constexpr std::size_t checksumSize = 23;  // without it, as in files of other programs
     Seeds seeds;
-    for (const bool half : {false, true}) {
-        writeVdb(path, half ? plain : withBody(plain, mesh), {.halfFloat = half});
+    const auto keep = [&] {
         const std::string file = contentsOf(path);
         seeds.push_back(file.substr(0, file.size() - checksumSize));
-    }
+    };
+    writeVdb(path, withBody(far, mesh));
+    keep();
+    writeVdb(path, plain, {.halfFloat = true});
+    keep();
+    writeGrids(path, {denseGrid(plain)});
+    keep();
     return seeds;
 }
 
@@ -217,6 +267,7 @@ const std::vector<FuzzCheck>& fuzzChecks() {
          {"NonlinearFrustumMap", "UniformScaleMap", "AffineMap", "Tree_bool_5_4_3", "Tree_string_5_4_3", "float",
           "string", "vec3s", "__delayedload", "Tree_float_5_4_3_HalfFloat", "Tree_ptdataidx32_5_4_3"}},
         {"vdb_entries", 200, checkVdbEntries, recipeSeeds},
+        {"tiles", 200, checkTiles, recipeSeeds},
         {"queries", 300, checkQueries, recipeSeeds},
         {"contacts", 200, checkContacts, recipeSeeds},
         {"rebuild", 200, checkRebuild, recipeSeeds},

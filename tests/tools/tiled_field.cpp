@@ -304,7 +304,19 @@ TEST_CASE("a tile that is missing or damaged is an error that names its file") {
     CHECK_THAT(messageOf(sampleAll), Catch::Contains("manifest.json: is no manifest"));
     std::ofstream(manifest, std::ios::binary)
         << R"({"field": {"tiles": [1, 2, 3]}, "mesh": {"origin": [0, 0, 0]}, "tiles": []})";
-    CHECK_THAT(messageOf(sampleAll), Catch::Contains("manifest.json: has 0 tiles, but states 1 x 2 x 3"));
+    CHECK_THAT(messageOf(sampleAll), Catch::Contains("it has 0 tiles, but states 1 x 2 x 3"));
+    const auto edited = [&](const char* path, nlohmann::json value) {
+        nlohmann::json all = tiles.manifest;
+        all[nlohmann::json::json_pointer(path)] = std::move(value);
+        std::ofstream(manifest, std::ios::binary) << all;
+        return messageOf(sampleAll);
+    };
+    CHECK_THAT(edited("/field/tiles", {-2, -2, 1}), Catch::Contains("it has 4 tiles, but states -2 x -2 x 1"));
+    CHECK_THAT(edited("/tiles/1/lower/0", 1e300), Catch::Contains("where a whole number up to 536870912 belongs"));
+    CHECK_THAT(edited("/tiles/1/lower/0", 1 << 30), Catch::Contains("where a whole number up to 536870912 belongs"));
+    CHECK_THAT(edited("/tiles/3/upper/1", 1 << 20), Catch::Contains("tile 1 1 0 does not follow the tiles before it"));
+    CHECK_THAT(edited("/tiles/2/band/upper/0", 1 << 20), Catch::Contains("or does not hold its band"));
+    CHECK_THAT(edited("/tiles/1/file", tiles.manifest["tiles"][2]["file"]), Catch::Contains("is missing or damaged"));
     fs::remove(manifest);
     CHECK_THAT(messageOf(sampleAll), Catch::Contains("manifest.json: no such file"));
 }
