@@ -75,7 +75,7 @@ def test_other_threads_run_during_calls(name, sphere, sphere_field):
         "hull": lambda: bilayer.Shape.hull(points[:200_000]),
         "spheres": lambda: bilayer.Shape.spheres(points[:400], 1),
         "triangles": lambda: [bilayer.Shape.triangles(mesh) for _ in range(1000)],
-        "particles": lambda: bilayer.particles(level_set, per_voxel=20),
+        "particles": lambda: bilayer.particles(level_set, per_voxel=3),
     }
     worker = threading.Thread(target=calls[name])
     begin = time.monotonic()
