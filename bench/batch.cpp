@@ -97,7 +97,7 @@ class BatchBench {
     void round() {
         batch("batch, 1 core", 1);
         batch(fmt::format("batch, {} cores", options_.threads), options_.threads);
-        separate(fmt::format("{} batches of a shard each at once, 1 core", options_.threads));
+        separate(fmt::format("{} batches at once, each a shard on 1 core", options_.threads));
         batch(fmt::format("batch, {} cores, all up to date", options_.threads), options_.threads, /*isAgain=*/true);
         loop("loop of build, all threads", options_.threads);
         loop("loop of build, 1 thread", 1);

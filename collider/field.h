@@ -211,7 +211,8 @@ class TiledField {
     /// @param folder  with manifest.json
     /// @param budget  max memory of the tiles that are kept; a single tile is kept even if it is larger [bytes]
     ///
-    /// Throws std::runtime_error that names a file that is missing or damaged.
+    /// Throws std::runtime_error that names a file that is missing or damaged, or the folder of a field with more than
+    /// 2^19 blocks along an axis.
     TiledField(const std::filesystem::path& folder, std::size_t budget, const FieldOptions& options = {});
 
     /// Distance and gradient at a point in field coordinates [m]. The result is that of Field::sample() of the merged

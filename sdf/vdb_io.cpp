@@ -65,7 +65,7 @@ LevelSet readVdb(const std::filesystem::path& path) {
     std::shared_ptr<Grids> grids = readGrids(path);
     try {
         const LevelSet levelSet(std::move(grids));
-        requireValidDistances(levelSet);
+        requireValidDistances(*levelSet.grids().distance, levelSet.interiorWidth());
         return levelSet;
     } catch (const std::invalid_argument& error) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));

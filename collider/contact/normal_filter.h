@@ -39,7 +39,7 @@ bool holdsDuringRotation(const glm::vec3& normal, const glm::vec3& rotation, Tes
 }
 
 /// Whether a contact passes, by the cosine between the reversed surface normal and the point's normal.
-/// @param isSeparated  the point belongs to a face and does not touch yet
+/// @param isSeparated  the point belongs to a face, and is not deeper than minFaceDepth
 inline bool passesNormalFilter(const ContactOptions& options, float cosine, bool isSeparated) {
     return cosine >=
            (isSeparated ? std::max(options.minNormalCosineApart, options.minNormalCosine) : options.minNormalCosine);

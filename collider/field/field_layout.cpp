@@ -2,6 +2,7 @@
 // Construction of field layouts.
 #include "collider/field/field_layout.h"
 
+#include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_sort.h>
 
@@ -118,6 +119,10 @@ std::vector<SurfaceBlock> enterBlocks(FieldLayout& field, const FloatTree& tree,
     return surface;
 }
 
+double count(const glm::ivec3& blocks) {
+    return double(blocks.x) * blocks.y * blocks.z;
+}
+
 // The leaves in a box that need a block.
 std::vector<Coord> storedBlocks(const FloatTree& tree, const openvdb::CoordBBox& within) {
     std::vector<Coord> origins;
@@ -144,7 +149,7 @@ std::vector<SurfaceBlock> enter(FieldLayout& field, const openvdb::FloatGrid& gr
 }  // namespace
 
 void FieldFrame::requireSize() const {
-    if (double(blocks.x) * blocks.y * blocks.z > double(maxBlocks))
+    if (count(blocks) > double(maxBlocks))
         throw std::invalid_argument("the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
     requireLength();
 }
@@ -186,6 +191,11 @@ FieldLayout::FieldLayout(const FieldFrame& frame, const Grids& grids, const Layo
     : FieldLayout(frame, storage) {
     blocks = part.blocks;
     requireSize();
+    if (count(blocks + 2 * clearanceReach) > double(maxBlocks))
+        throw std::invalid_argument(
+            fmt::format("a tile and the {} blocks around it are more than 2^26 blocks of 8^3 voxels: take tiles of "
+                        "more equal sides",
+                        clearanceReach));
     const Coord first(part.first.x, part.first.y, part.first.z);
     const auto box =
         openvdb::CoordBBox(first, first + Coord(side * blocks.x - 1, side * blocks.y - 1, side * blocks.z - 1));

@@ -18,6 +18,7 @@
 #include "sdf/base/openvdb.h"
 #include "sdf/grid/distance_check.h"
 #include "sdf/grid/vdb_grids.h"
+#include "sdf/tiles/tile_merge.h"
 
 namespace bilayer::detail {
 namespace {
@@ -37,16 +38,22 @@ bool overlap(const PlacedTile& a, const PlacedTile& b, int margin) {
            glm::all(glm::lessThan(b.first, a.first + blockEdgeVoxels * a.blocks + reach));
 }
 
-/// The grids of a tile's file, checked as those of a whole field are.
-TileGrids gridsOf(const TileRecord& tile) {
-    tile.field.requireIntact();
-    TileGrids read = readTile(tile.field.path);
+/// Calls work(), and names a file in its errors.
+template <class Work>
+auto named(const std::filesystem::path& path, const Work& work) {
     try {
-        if (tile.hasBand) requireValidDistances(LevelSet(read.grids));
+        return work();
     } catch (const std::invalid_argument& error) {
-        throw std::runtime_error(fmt::format("{}: {}", tile.field.path.string(), error.what()));
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
     }
-    return read;
+}
+
+/// The grids of a tile's file; the distances with those of its border.
+std::shared_ptr<Grids> gridsOf(const TileRecord& tile) {
+    tile.field.requireIntact();
+    const TileGrids read = readTile(tile.field.path);
+    addBorder(openvdb::ConstPtrCast<openvdb::FloatGrid>(read.grids->distance)->tree(), read.border->tree());
+    return read.grids;
 }
 
 void requireWithin(const TileRecord& tile, std::span<const SurfaceBlock> blocks) {
@@ -62,7 +69,7 @@ void requireWithin(const TileRecord& tile, std::span<const SurfaceBlock> blocks)
 TiledFieldData::TiledFieldData(const std::filesystem::path& folder, std::size_t budget, Storage storage)
     : manifest_(readTileManifest(folder)), storage_(storage) {
     readSurface();
-    readFrame();
+    named(folder, [&] { readFrame(); });
     placeTiles();
     std::vector<std::size_t> sizes;
     for (std::size_t tile = 0; tile < tileCount(); ++tile) sizes.push_back(bytesOf(tile));
@@ -99,9 +106,13 @@ void TiledFieldData::readFrame() {
         lower = glm::min(lower, record.band.first);
         upper = glm::max(upper, record.band.end - 1);
     }
-    if (!smallest || surface_.empty()) throw std::invalid_argument("the field in tiles has no voxel in its band");
-    const LevelSet tile(gridsOf(manifest_.tiles[*smallest]).grids);
+    if (!smallest || surface_.empty()) throw std::invalid_argument("has no voxel in its band");
+    const TileRecord& record = manifest_.tiles[*smallest];
+    const LevelSet tile = named(record.field.path, [&] { return LevelSet(gridsOf(record)); });
     const openvdb::FloatGrid& grid = *tile.grids().distance;
+    Grids pattern;
+    pattern.distance = grid.copyWithNewTree();
+    pattern_ = std::make_shared<const Grids>(std::move(pattern));
     const auto placeOf = [&](const glm::ivec3& voxel) {
         const openvdb::Vec3d p = grid.indexToWorld(openvdb::Coord(voxel.x, voxel.y, voxel.z));
         return glm::dvec3(p.x(), p.y(), p.z());
@@ -192,14 +203,11 @@ std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
         grid->setTransform(openvdb::math::Transform::createLinearTransform(frame_.voxel));
         grids.distance = grid;
     } else {
-        const TileGrids read = gridsOf(record);
-        if (read.grids->distance->voxelSize()[0] != frame_.voxel)
-            throw std::runtime_error(fmt::format("{}: has voxels of {:g} m, and other tiles have voxels of {:g} m",
-                                                 record.field.path.string(), read.grids->distance->voxelSize()[0],
-                                                 frame_.voxel));
-        const auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(read.grids->distance);
-        addBorder(grid->tree(), read.border->tree());
-        grids.distance = grid;
+        grids = *gridsOf(record);
+        named(record.field.path, [&] {
+            requireSameField(*pattern_->distance, *grids.distance);
+            requireValidDistances(*grids.distance, frame_.interiorWidth);
+        });
     }
     const std::vector<SurfaceBlock> surface = surfaceAround(placed_[tile]);
     const LayoutPart part{placed_[tile].first, placed_[tile].blocks, surface};

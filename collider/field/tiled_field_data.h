@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <bilayer/collider/field.h>
+#include <bilayer/sdf/grids.h>
 #include "collider/field/tile_cache.h"
 #include "sdf/tiles/tile_manifest.h"
 
@@ -60,6 +61,7 @@ class TiledFieldData {
 
     TileManifest manifest_;
     Storage storage_;
+    std::shared_ptr<const Grids> pattern_;    // without voxels: properties that all tiles have
     FieldFrame frame_;                        // without bounds of a directory, which would be too large
     glm::ivec3 first_{0};                     // voxel of the box of all stored blocks
     glm::dvec3 fixedOffset_{0};               // of a point's place, as FieldData::Lanes has it [voxels]

@@ -21,13 +21,13 @@ namespace {
 /// Limit of voxel coordinates: sums of a few coordinates still fit in an int.
 constexpr std::int32_t maxVoxelCoordinate = 1 << 30;
 
-/// Checks all distances of a level set.
+/// Checks all distances of a grid.
 class DistanceCheck {
   public:
-    explicit DistanceCheck(const LevelSet& levelSet)
-        : grid_(*levelSet.grids().distance),
-          exterior_(levelSet.exteriorWidth()),
-          interior_(levelSet.interiorWidth()),
+    DistanceCheck(const openvdb::FloatGrid& grid, float interiorWidth)
+        : grid_(grid),
+          exterior_(grid.background()),
+          interior_(interiorWidth),
           isOurs_(grid_[metadata::interiorWidth] || grid_[metadata::version]),
           isBand_(isOurs_ && grid_[metadata::errorBound]) {}
 
@@ -91,8 +91,8 @@ class DistanceCheck {
 
 }  // namespace
 
-void requireValidDistances(const LevelSet& levelSet) {
-    DistanceCheck(levelSet).run();
+void requireValidDistances(const openvdb::FloatGrid& grid, float interiorWidth) {
+    DistanceCheck(grid, interiorWidth).run();
 }
 
 }  // namespace bilayer::detail

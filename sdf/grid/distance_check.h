@@ -3,7 +3,7 @@
 // Tested by tests/sdf/vdb_io.cpp through readVdb().
 #pragma once
 
-#include <bilayer/sdf/level_set.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 
@@ -13,6 +13,7 @@ namespace bilayer::detail {
 /// - the stored interior width is not that of inactive voxels inside, or less than that of an active one;
 /// - an active voxel outside is beyond the background;
 /// - a voxel is too far from the origin of the grid.
-void requireValidDistances(const LevelSet& levelSet);
+/// @param interiorWidth  LevelSet::interiorWidth() [m]
+void requireValidDistances(const openvdb::FloatGrid& grid, float interiorWidth);
 
 }  // namespace bilayer::detail

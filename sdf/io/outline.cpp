@@ -118,7 +118,7 @@ void Outline::reset(std::span<const glm::dvec2> points) {
     corners_.resize(left_);
     obstacles_.reset(points);
     for (unsigned i = 0; i < left_; ++i)
-        corners_[i] = {points[i], i > 0 ? i - 1 : left_ - 1, i + 1 < left_ ? i + 1 : 0, true, true, false, i};
+        corners_[i] = {points[i], i > 0 ? i - 1 : left_ - 1, i + 1 < left_ ? i + 1 : 0, true, true, false, i, false};
     for (unsigned i = 0; i < left_; ++i) classify(i);
     wasConvex_ = std::all_of(corners_.begin(), corners_.end(), [](const Corner& corner) { return corner.convex; }) &&
                  turnsOnce(points);
@@ -184,30 +184,32 @@ bool Outline::isPinched(unsigned v, unsigned w) {
 }
 
 // For a corner w that runs along both edges of a corner v, the other way: follows the outline from w on and from v back
-// to the place where they part. Returns whether w leaves on the inner side of v there. If not, all pairs of corners on
-// the way remember it, so that a slit with many corners is followed once.
+// to the place where they part. Returns whether w leaves on the inner side of v there. The corners on the way note
+// their partners and the answer, so that edges both ways with many corners are followed once.
 bool Outline::leavesInside(unsigned v, unsigned w) {
     way_.clear();
     glm::dvec2 at = corners_[v].at;
-    while (corners_[v].acrossSlit != w && way_.size() < corners_.size()) {
+    int side = 0;
+    while (corners_[v].partner != w && side == 0 && way_.size() < corners_.size()) {
         way_.emplace_back(v, w);
         const glm::dvec2 from = at, &p = corners_[corners_[v].before].at, &q = corners_[corners_[w].after].at;
         at = isBetween(from, q, p) ? q : p;
         if (at == p) v = corners_[v].before;
         if (at == q) w = corners_[w].after;
-        const int side = leavingSide(v, w, at, from);
-        if (side > 0) return true;
-        if (side < 0) break;
+        side = leavingSide(v, w, at, from);
     }
+    const bool isInside = side > 0 || (side == 0 && corners_[v].partner == w && corners_[v].partnerIsInside);
     for (const auto& [a, b] : way_) {
-        corners_[a].acrossSlit = b;
-        corners_[b].acrossSlit = a;
+        corners_[a].partner = b;
+        corners_[b].partner = a;
+        corners_[a].partnerIsInside = corners_[b].partnerIsInside = isInside;
     }
-    return false;
+    return isInside;
 }
 
-// The outline leaves a point by a corner w and arrives there by a corner v; both meet the same line from there. Returns
-// 1 if w leaves on the inner side of v, -1 if it does on the outer side, and 0 if both run along each other further.
+// At a place of an edge both ways, w's side goes on and v's side comes in; before, both lie along the line to `from`.
+// Returns 1 if w's side goes on on the inner side of v's, -1 on its outer side, and 0 if both still lie along each
+// other.
 int Outline::leavingSide(unsigned v, unsigned w, const glm::dvec2& at, const glm::dvec2& from) const {
     const Corner &corner = corners_[v], &other = corners_[w];
     const glm::dvec2 &end = corners_[corner.before].at, &out = corners_[other.after].at;

@@ -30,8 +30,10 @@ class Outline {
         glm::dvec2 at;
         unsigned before, after;
         bool present, convex;
-        bool full;            ///< its interior angle is 360 degrees
-        unsigned acrossSlit;  ///< a corner on the other side of the same slit, or itself
+        bool full;  ///< its interior angle is 360 degrees
+        /// The other corner where the outline runs along an edge both ways and leavesInside() has passed; else itself.
+        unsigned partner;
+        bool partnerIsInside;  ///< the answer of leavesInside()
     };
 
     /// Starts with the corners of one ring.

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <glm/vector_relational.hpp>
@@ -19,6 +20,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr int maxCoordinate = 1 << 29;  // of voxels, so that sums and differences fit into 32 bits
+constexpr std::size_t maxFileName = 255;
 
 int whole(const Json& json) {
     if (!json.is_number_integer() || !(std::abs(json.get<double>()) <= maxCoordinate))
@@ -36,6 +38,16 @@ BlockBox boxOf(const Json& json) {
     return {triple(json.at("lower")), triple(json.at("upper")) + 1};
 }
 
+HashedFile fileOf(const Json& name, const Json& hash, const std::filesystem::path& folder) {
+    const auto text = name.get<std::string>();
+    const bool isPlain = text != "." && text != ".." && text == std::filesystem::path(text).filename() &&
+                         text.size() <= maxFileName &&
+                         std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
+    if (!isPlain || text.empty())
+        throw std::runtime_error(fmt::format("{} is no name of a file in its folder", quotedWord(text)));
+    return {folder / text, hash.get<std::string>()};
+}
+
 TileRecord recordOf(const Json& json, const std::filesystem::path& folder) {
     TileRecord record{.box = boxOf(json), .field{}, .cells{}};
     if (json.at("file").is_null()) {
@@ -45,8 +57,8 @@ TileRecord recordOf(const Json& json, const std::filesystem::path& folder) {
         throw std::runtime_error(
             fmt::format("the side of a tile is {}, and must be 'inside' or 'outside'", quotedWord(side)));
     }
-    record.field = {folder / json.at("file").get<std::string>(), json.at("hash").get<std::string>()};
-    record.cells = {folder / json.at("cells").get<std::string>(), json.at("cellsHash").get<std::string>()};
+    record.field = fileOf(json.at("file"), json.at("hash"), folder);
+    record.cells = fileOf(json.at("cells"), json.at("cellsHash"), folder);
     record.hasBand = !json.at("band").is_null();
     if (record.hasBand) record.band = boxOf(json.at("band"));
     return record;
@@ -57,14 +69,15 @@ bool isWithin(const BlockBox& inner, const BlockBox& outer) {
            outer.contains(inner.end - 1);
 }
 
-// Whether a tile begins on whole blocks where the tile before it ends, as all tiles at the same place along an axis do.
+// Whether a tile's extent along an axis is of whole blocks, begins where the tile before it ends, and is that of all
+// tiles in the same layer.
 bool isInLine(const TileManifest& manifest, const glm::ivec3& place, int axis) {
     glm::ivec3 same(0), before = place;
     same[axis] = place[axis];
     --before[axis];
-    const BlockBox &box = manifest.tiles[manifest.at(place)].box, &line = manifest.tiles[manifest.at(same)].box;
-    return box.first[axis] == line.first[axis] && box.end[axis] == line.end[axis] && box.first[axis] % blockSide == 0 &&
-           box.end[axis] % blockSide == 0 &&
+    const BlockBox &box = manifest.tiles[manifest.at(place)].box, &layer = manifest.tiles[manifest.at(same)].box;
+    return box.first[axis] == layer.first[axis] && box.end[axis] == layer.end[axis] &&
+           box.first[axis] % blockSide == 0 && box.end[axis] % blockSide == 0 &&
            (place[axis] == 0 || box.first[axis] == manifest.tiles[manifest.at(before)].box.end[axis]);
 }
 
@@ -79,12 +92,15 @@ void requireOrder(const TileManifest& manifest) {
         for (place.y = 0; place.y < counts.y; ++place.y)
             for (place.z = 0; place.z < counts.z; ++place.z) {
                 const TileRecord& tile = manifest.tiles[manifest.at(place)];
-                if (!isWithin(tile.box, tile.box) || (tile.hasBand && !isWithin(tile.band, tile.box)) ||
-                    !isInLine(manifest, place, 0) || !isInLine(manifest, place, 1) || !isInLine(manifest, place, 2))
-                    throw std::runtime_error(fmt::format(
-                        "tile {} {} {} does not follow the tiles before it, on whole blocks of {} voxels, or does not "
-                        "hold its band",
-                        place.x, place.y, place.z, blockSide));
+                const std::string name = fmt::format("tile {} {} {}", place.x, place.y, place.z);
+                if (!isWithin(tile.box, tile.box) || !isInLine(manifest, place, 0) || !isInLine(manifest, place, 1) ||
+                    !isInLine(manifest, place, 2))
+                    throw std::runtime_error(
+                        fmt::format("{}: its box must be of whole blocks of {} voxels, and begin "
+                                    "where the tile before it ends",
+                                    name, blockSide));
+                if (tile.hasBand && !isWithin(tile.band, tile.box))
+                    throw std::runtime_error(name + ": its band must lie in its box");
             }
 }
 
@@ -102,6 +118,9 @@ TileManifest readTileManifest(const std::filesystem::path& folder) {
         throw std::runtime_error(
             fmt::format("{}: no such file; `bilayer build --tiles` writes it when all tiles are there", path.string()));
     requireInputFile(path);
+    const auto refuse = [&](const char* why) {
+        throw std::runtime_error(fmt::format("{}: is no manifest of tiles ({})", path.string(), oneLine(why)));
+    };
     TileManifest manifest;
     try {
         std::ifstream stream(path, std::ios::binary);
@@ -111,8 +130,10 @@ TileManifest readTileManifest(const std::filesystem::path& folder) {
         manifest.origin = {origin.at(0).get<double>(), origin.at(1).get<double>(), origin.at(2).get<double>()};
         for (const Json& tile : json.at("tiles")) manifest.tiles.push_back(recordOf(tile, folder));
         requireOrder(manifest);
-    } catch (const std::exception& error) {
-        throw std::runtime_error(fmt::format("{}: is no manifest of tiles ({})", path.string(), oneLine(error.what())));
+    } catch (const Json::exception& error) {
+        refuse(error.what());
+    } catch (const std::runtime_error& error) {
+        refuse(error.what());
     }
     return manifest;
 }

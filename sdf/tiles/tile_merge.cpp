@@ -30,7 +30,16 @@ openvdb::FloatGrid::Ptr withoutTree(const openvdb::FloatGrid& tile) {
     return grid;
 }
 
-void requireSame(const openvdb::FloatGrid& first, const openvdb::FloatGrid& tile) {
+bool isFlooded(const openvdb::FloatGrid& tile) {
+    return entryOf<std::string>(tile, metadata::sign) == nameOf(Sign::flood);
+}
+
+// Blocks without a voxel in the band are in the tiles if the field needs them, so none is dropped.
+constexpr auto plain = Assembler::Plain::keep;
+
+}  // namespace
+
+void requireSameField(const openvdb::FloatGrid& first, const openvdb::FloatGrid& tile) {
     const auto refuse = [](const std::string& what) {
         throw std::invalid_argument(fmt::format("two tiles are of different fields: their {} differ", what));
     };
@@ -43,15 +52,6 @@ void requireSame(const openvdb::FloatGrid& first, const openvdb::FloatGrid& tile
         if (!other || *other != *entry->second) refuse(fmt::format("entries '{}'", key));
     }
 }
-
-bool isFlooded(const openvdb::FloatGrid& tile) {
-    return entryOf<std::string>(tile, metadata::sign) == nameOf(Sign::flood);
-}
-
-// Blocks without a voxel in the band are in the tiles if the field needs them, so none is dropped.
-constexpr auto plain = Assembler::Plain::keep;
-
-}  // namespace
 
 void TileMerger::begin(const openvdb::FloatGrid& first, bool triangles) {
     const float h = float(first.voxelSize()[0]);
@@ -69,7 +69,7 @@ void TileMerger::addSpace(const openvdb::FloatGrid& tile) {
 
 void TileMerger::add(const Grids& tile) {
     if (!assembler_) begin(*tile.distance, tile.triangle != nullptr);
-    requireSame(*first_, *tile.distance);
+    requireSameField(*first_, *tile.distance);
     undecided_ += entryOf<std::int64_t>(*tile.distance, metadata::signUndecided);
     assembler_->copy(tile, [](const openvdb::Coord&) { return true; });
     if (isFlooded(*first_)) addSpace(*tile.distance);

@@ -17,6 +17,9 @@
 
 namespace bilayer::detail {
 
+/// Throws std::invalid_argument unless two tiles have the same voxels, widths and metadata, as tiles of one field do.
+void requireSameField(const openvdb::FloatGrid& first, const openvdb::FloatGrid& tile);
+
 /// Takes tiles one by one, in any order. Its memory is that of the tiles that it has taken.
 class TileMerger {
   public:

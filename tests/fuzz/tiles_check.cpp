@@ -86,7 +86,7 @@ class TilesOfBox {
     std::vector<std::vector<SurfaceBlock>> blocks_;
 };
 
-/// A value of any type, often a number near one that stands in a manifest.
+/// A value of any type, often a whole number near the old one.
 Json arbitraryValue(const Json& old, ByteSource& bytes) {
     switch (bytes.below(8)) {
         case 0:
@@ -94,7 +94,7 @@ Json arbitraryValue(const Json& old, ByteSource& bytes) {
         case 1:
             return double(bytes.anyFloat());
         case 2:
-            return std::string(bytes.below(30), char('a' + bytes.below(26)));
+            return std::string(bytes.below(300), char(bytes.byte() & 127));
         case 3:
             return Json::array({bytes.number<std::int32_t>()});
         case 4:
@@ -102,8 +102,8 @@ Json arbitraryValue(const Json& old, ByteSource& bytes) {
         case 5:
             return bytes.number<std::int32_t>();
         default:
-            return old.is_number() ? Json(old.get<double>() + double(8 * bytes.number<std::int8_t>()))
-                                   : Json(bytes.flag());
+            if (!old.is_number_integer()) return bytes.flag();
+            return old.get<std::int64_t>() + (bytes.flag() ? blockSide : 1) * bytes.number<std::int8_t>();
     }
 }
 
@@ -118,6 +118,14 @@ void editManifest(Json& manifest, ByteSource& bytes) {
         manifest[at] = arbitraryValue(leaf.value(), bytes);
 }
 
+/// Moves the border of the two tiles.
+void moveBorder(Json& manifest, ByteSource& bytes) {
+    Json& tiles = manifest["tiles"];
+    const int shift = blockSide * bytes.number<std::int8_t>();
+    tiles[0]["upper"][0] = tiles[0]["upper"][0].get<int>() + shift;
+    tiles[1]["lower"][0] = tiles[1]["lower"][0].get<int>() + shift;
+}
+
 void editBlocks(std::vector<SurfaceBlock>& blocks, ByteSource& bytes) {
     if (blocks.empty()) return;
     SurfaceBlock& block = blocks[bytes.below(unsigned(blocks.size()))];
@@ -129,12 +137,14 @@ void editBlocks(std::vector<SurfaceBlock>& blocks, ByteSource& bytes) {
 /// @param isValid  the field must open
 void useTiles(const fs::path& folder, ByteSource& bytes, bool isValid) {
     try {
-        const TiledField field(folder, budget);
+        const FieldOptions options{bytes.flag() ? Storage::fixed16 : Storage::float32};
+        const TiledField field(folder, budget, options);
         for (int i = 0; i < 8; ++i) {
             const glm::vec3 point = i % 2 ? bytes.anyVector() : 0.5f * bytes.latticePoint();
             (void)field.sample(point);
             (void)field.inside(point);
             (void)field.closest(point, 1);
+            (void)field.raycast({point, {1, 0.5f, 0.25f}, 10});
         }
     } catch (const std::invalid_argument& error) {
         require(!isValid, error.what());
@@ -162,7 +172,8 @@ void checkTiles(Bytes edits) {
         manifest["tiles"][tile]["cells"] = name;
         manifest["tiles"][tile]["cellsHash"] = fileHash(valid.folder() / name);
     }
-    for (unsigned i = 0; i < count; ++i) editManifest(manifest, bytes);
+    if (count > 0 && bytes.flag()) moveBorder(manifest, bytes);
+    for (unsigned i = 1; i < count; ++i) editManifest(manifest, bytes);
     std::string text = manifest.dump();
     if (bytes.byte() % 8 == 0)
         for (unsigned i = 0; i < count; ++i) text[bytes.below(65536) % text.size()] = char(bytes.byte());

@@ -250,6 +250,22 @@ inline Outline spiral(int turns) {
     return inner;
 }
 
+// Two squares that are joined by a zigzag edge both ways.
+inline Outline corridor(int corners, bool mirrored) {
+    Outline way, outline;
+    for (int i = 0; i < corners; ++i) way.push_back({i, i % 2});
+    const int last = corners - 1, y = last % 2;
+    outline.insert(outline.end(), way.begin(), way.end());
+    outline.insert(outline.end(), {{last + 4, y - 2}, {last + 8, y}, {last + 4, y + 2}});
+    outline.insert(outline.end(), way.rbegin(), way.rend());
+    outline.insert(outline.end(), {{-4, 2}, {-8, 0}, {-4, -2}});
+    if (mirrored) {
+        for (Point& point : outline) point.x = -point.x;
+        std::reverse(outline.begin(), outline.end());
+    }
+    return outline;
+}
+
 // A square with a slit without thickness that winds from its corner to its centre.
 inline Outline slit(int corners) {
     Outline way{{0, 0}};

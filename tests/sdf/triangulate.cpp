@@ -86,6 +86,13 @@ void checkTouching(Outline outline, std::mt19937& random) {
     }
 }
 
+void checkOnce(const Outline& outline, std::mt19937& random) {
+    std::vector<glm::uvec3> triangles;
+    REQUIRE(triangulate(inSpace(outline, random), triangles));
+    checkEdges(outline.size(), triangles);
+    checkAreas(outline, triangles);
+}
+
 // Checks that an invalid outline is reported; its triangles still close the surface that they belong to.
 void checkWrong(const Outline& outline, std::mt19937& random) {
     std::vector<glm::uvec3> triangles;
@@ -197,6 +204,8 @@ TEST_CASE("combs and spirals of many corners are cut exactly") {
     check(Squares(30000, false, random).outline(1, random), random);
     check(star(100000, 1 << 20, random), random);
     check(slit(30000), random);
+    for (const bool mirrored : {false, true}) checkTouching(corridor(10, mirrored), random);
+    for (const bool mirrored : {false, true}) checkOnce(corridor(30000, mirrored), random);
 }
 
 TEST_CASE("repeated corners and edges out and back cost a triangle without area each") {

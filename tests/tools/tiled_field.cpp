@@ -14,8 +14,12 @@
 #include <vector>
 
 #include <bilayer/collider/field.h>
+#include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
+#include "sdf/grid/vdb_grids.h"
+#include "sdf/io/content_hash.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/tools/tile_builds.h"
@@ -314,9 +318,38 @@ TEST_CASE("a tile that is missing or damaged is an error that names its file") {
     CHECK_THAT(edited("/field/tiles", {-2, -2, 1}), Catch::Contains("it has 4 tiles, but states -2 x -2 x 1"));
     CHECK_THAT(edited("/tiles/1/lower/0", 1e300), Catch::Contains("where a whole number up to 536870912 belongs"));
     CHECK_THAT(edited("/tiles/1/lower/0", 1 << 30), Catch::Contains("where a whole number up to 536870912 belongs"));
-    CHECK_THAT(edited("/tiles/3/upper/1", 1 << 20), Catch::Contains("tile 1 1 0 does not follow the tiles before it"));
-    CHECK_THAT(edited("/tiles/2/band/upper/0", 1 << 20), Catch::Contains("or does not hold its band"));
+    CHECK_THAT(edited("/tiles/3/upper/1", 1 << 20), Catch::Contains("tile 1 1 0: its box must be of whole blocks"));
+    CHECK_THAT(edited("/tiles/2/band/upper/0", 1 << 20), Catch::Contains("tile 1 0 0: its band must lie in its box"));
     CHECK_THAT(edited("/tiles/1/file", tiles.manifest["tiles"][2]["file"]), Catch::Contains("is missing or damaged"));
+    for (const std::string& name :
+         {std::string("../a.vdb"), std::string("\x1b]0;a\x07"), std::string(256, 'a'), std::string()})
+        CHECK_THAT(edited("/tiles/1/file", name), Catch::Contains("is no name of a file in its folder"));
+    // files that fit their hashes, but not each other
+    const auto exchanged = [&](const char* entry, const char* hash, const auto& write) {
+        const fs::path file = tiles.folder / "exchanged";
+        write(file);
+        nlohmann::json all = tiles.manifest;
+        all["tiles"][1][entry] = "exchanged";
+        all["tiles"][1][hash] = detail::fileHash(file);
+        std::ofstream(manifest, std::ios::binary) << all;
+        return messageOf(sampleAll);
+    };
+    const auto otherCells = [&](const fs::path& file) { fs::copy_file(fileOf("cells", 2), file); };
+    CHECK_THAT(exchanged("cells", "cellsHash", otherCells),
+               Catch::Contains("exchanged: has a block that is not in its tile"));
+    const auto otherVoxels = [&](const fs::path& file) {
+        const Tiles other = knot("tiled damage 2", "2x2x1", {"--resolution", "90"});
+        fs::copy_file(other.folder / other.manifest["tiles"][1]["file"].get<std::string>(), file,
+                      fs::copy_options::overwrite_existing);
+    };
+    CHECK_THAT(exchanged("file", "hash", otherVoxels), Catch::Contains("two tiles are of different fields"));
+    const auto notFinite = [&](const fs::path& file) {
+        const detail::TileGrids read = detail::readTile(fileOf("file", 1));
+        const auto border = openvdb::ConstPtrCast<openvdb::FloatGrid>(read.border);
+        border->tree().setValue(openvdb::Coord(0, 0, 0), std::nanf(""));
+        writeGrids(file, {read.grids->distance, border});
+    };
+    CHECK_THAT(exchanged("file", "hash", notFinite), Catch::Contains("a distance that is no finite number"));
     fs::remove(manifest);
     CHECK_THAT(messageOf(sampleAll), Catch::Contains("manifest.json: no such file"));
 }
