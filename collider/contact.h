@@ -88,12 +88,12 @@ struct ContactOptions {
     /// is the ghost-collision (internal-edge) filter. Points just below an edge of the other body get the normal of the
     /// nearest face, which may be the wrong one. A sharp point that fails the test is tested again one voxel back along
     /// its own normal, if that is outside. Vertices of a cube, whose normals average three faces, reach 0.57. If this
-    /// limit and the next one are below -1, no contact is dropped by them.
+    /// and minNormalCosineApart are below -1, they drop no contact.
     float minNormalCosine = 0.3f;
     /// The same limit for face points that do not touch yet, or are less than a thousandth of a voxel deep. A point
     /// next to the other body sees its edge obliquely, or approaches its side, and would be blocked there.
     float minNormalCosineApart = 0.9f;
-    /// Whether such points keep contacts with edges that they see at more than half a degree off
+    /// Whether face points that are apart keep contacts with edges that they see at more than half a degree off
     /// their normal. Such contacts are redundant: the edges' own points meet the faces perpendicularly.
     bool keepsObliqueEdges = false;
     /// Reduces the contacts to those that a solver needs: for each patch of contacts with similar normals up to twelve,

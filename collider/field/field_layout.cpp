@@ -29,8 +29,9 @@ using openvdb::FloatTree;
 using Accessor = openvdb::FloatGrid::ConstAccessor;
 
 constexpr int side = FieldLayout::side;
-constexpr std::int64_t maxBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
-constexpr int minSteps = 126;                // from 0 to the end of the band, for the stored minima
+constexpr std::int64_t maxBlocks = 1 << 26;        // of the box: 0.75 GiB at 12 bytes each
+constexpr std::int64_t maxBlocksAround = 1 << 27;  // of a part with those around it: 2 GiB for a moment, 16 bytes each
+constexpr int minSteps = 126;                      // from 0 to the end of the band, for the stored minima
 
 [[noreturn]] void throwTooLong() {
     throw std::invalid_argument("the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
@@ -154,6 +155,14 @@ void FieldFrame::requireSize() const {
     requireLength();
 }
 
+void FieldFrame::requireSizeOfPart() const {
+    requireSize();
+    if (findsSurface() && count(blocks + 2 * clearanceReach) > double(maxBlocksAround))
+        throw std::invalid_argument(fmt::format(
+            "a tile with the {} blocks around it holds more than 2^27 blocks of 8^3 voxels: take more tiles",
+            clearanceReach));
+}
+
 void FieldFrame::requireLength() const {
     if (std::max({blocks.x, blocks.y, blocks.z}) > maxBlocksAlong) throwTooLong();
 }
@@ -190,12 +199,7 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
 FieldLayout::FieldLayout(const FieldFrame& frame, const Grids& grids, const LayoutPart& part, Storage storage)
     : FieldLayout(frame, storage) {
     blocks = part.blocks;
-    requireSize();
-    if (count(blocks + 2 * clearanceReach) > double(maxBlocks))
-        throw std::invalid_argument(
-            fmt::format("a tile and the {} blocks around it are more than 2^26 blocks of 8^3 voxels: take tiles of "
-                        "more equal sides",
-                        clearanceReach));
+    requireSizeOfPart();
     const Coord first(part.first.x, part.first.y, part.first.z);
     const auto box =
         openvdb::CoordBBox(first, first + Coord(side * blocks.x - 1, side * blocks.y - 1, side * blocks.z - 1));

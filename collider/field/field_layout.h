@@ -50,6 +50,8 @@ struct FieldFrame {
     static constexpr int maxBlocksAlong = 1 << 19;
     /// Throws std::invalid_argument if the directory has more than 2^26 entries, or more than 2^19 along an axis.
     void requireSize() const;
+    /// The same for a part of a field, and if it has more than 2^27 blocks with those within clearanceReach around it.
+    void requireSizeOfPart() const;
     /// Throws std::invalid_argument if the directory has more than 2^19 entries along an axis.
     void requireLength() const;
 

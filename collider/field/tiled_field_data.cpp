@@ -71,6 +71,7 @@ TiledFieldData::TiledFieldData(const std::filesystem::path& folder, std::size_t 
     readSurface();
     named(folder, [&] { readFrame(); });
     placeTiles();
+    named(folder, [&] { requireSizes(); });
     std::vector<std::size_t> sizes;
     for (std::size_t tile = 0; tile < tileCount(); ++tile) sizes.push_back(bytesOf(tile));
     cache_ = std::make_unique<TileCache>(budget, std::move(sizes), [this](std::size_t tile) { return read(tile); });
@@ -156,6 +157,14 @@ void TiledFieldData::placeTiles() {
         }
 }
 
+void TiledFieldData::requireSizes() const {
+    for (const PlacedTile& placed : placed_) {
+        FieldFrame part = frame_;
+        part.blocks = placed.blocks;
+        part.requireSizeOfPart();
+    }
+}
+
 glm::ivec3 TiledFieldData::placeOf(const glm::ivec3& block) const {
     glm::ivec3 place;
     for (int axis = 0; axis < 3; ++axis) {
@@ -203,7 +212,7 @@ std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
         grid->setTransform(openvdb::math::Transform::createLinearTransform(frame_.voxel));
         grids.distance = grid;
     } else {
-        grids = *gridsOf(record);
+        grids.distance = gridsOf(record)->distance;
         named(record.field.path, [&] {
             requireSameField(*pattern_->distance, *grids.distance);
             requireValidDistances(*grids.distance, frame_.interiorWidth);

@@ -55,6 +55,7 @@ class TiledFieldData {
     void readSurface();
     void readFrame();
     void placeTiles();
+    void requireSizes() const;
     std::size_t bytesOf(std::size_t tile) const;
     std::shared_ptr<const FieldData> read(std::size_t tile) const;
     std::vector<SurfaceBlock> surfaceAround(const PlacedTile& tile) const;

@@ -76,7 +76,7 @@ exact: take distances from the triangles everywhere.
 scale_a, scale_b: uniform scales, above 0.
 motion_a, motion_b: displacement and rotation vector over the step, shape (2, 3), for speculative contacts.
 min_normal_cosine: a contact counts only if the cosine between the point's own normal and the surface's reversed normal
-is at least this. Below -1 it always counts.
+is at least this. If this and min_normal_cosine_apart are below -1, it always counts.
 min_normal_cosine_apart: the same for face points that are apart, or less than a thousandth of a voxel deep; they would
     otherwise catch on inner edges.
 keep_oblique_edges: also keep contacts of face points with edges that they see obliquely.

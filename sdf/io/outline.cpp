@@ -207,9 +207,8 @@ bool Outline::leavesInside(unsigned v, unsigned w) {
     return isInside;
 }
 
-// At a place of an edge both ways, w's side goes on and v's side comes in; before, both lie along the line to `from`.
-// Returns 1 if w's side goes on on the inner side of v's, -1 on its outer side, and 0 if both still lie along each
-// other.
+// The outline passes a place twice: towards it by v and away from it by w. On the line to `from`, both are one.
+// Returns 1 if the way by w then continues inside of that by v, -1 outside, and 0 if both are one further.
 int Outline::leavingSide(unsigned v, unsigned w, const glm::dvec2& at, const glm::dvec2& from) const {
     const Corner &corner = corners_[v], &other = corners_[w];
     const glm::dvec2 &end = corners_[corner.before].at, &out = corners_[other.after].at;

@@ -31,7 +31,7 @@ class Outline {
         unsigned before, after;
         bool present, convex;
         bool full;  ///< its interior angle is 360 degrees
-        /// The other corner where the outline runs along an edge both ways and leavesInside() has passed; else itself.
+        /// The last corner that leavesInside() paired with it; at first itself.
         unsigned partner;
         bool partnerIsInside;  ///< the answer of leavesInside()
     };

@@ -96,8 +96,8 @@ void requireOrder(const TileManifest& manifest) {
                 if (!isWithin(tile.box, tile.box) || !isInLine(manifest, place, 0) || !isInLine(manifest, place, 1) ||
                     !isInLine(manifest, place, 2))
                     throw std::runtime_error(
-                        fmt::format("{}: its box must be of whole blocks of {} voxels, and begin "
-                                    "where the tile before it ends",
+                        fmt::format("{}: its box must be of whole blocks of {} voxels, begin where the tile before it "
+                                    "ends, and be as long as the others of its layer",
                                     name, blockSide));
                 if (tile.hasBand && !isWithin(tile.band, tile.box))
                     throw std::runtime_error(name + ": its band must lie in its box");

@@ -44,7 +44,8 @@ void requireSameField(const openvdb::FloatGrid& first, const openvdb::FloatGrid&
         throw std::invalid_argument(fmt::format("two tiles are of different fields: their {} differ", what));
     };
     if (tile.background() != first.background()) refuse("band widths");
-    if (tile.transform() != first.transform()) refuse("voxel sizes or origins");
+    if (tile.voxelSize() != first.voxelSize() || tile.transform() != first.transform())
+        refuse("voxel sizes or origins");
     for (auto entry = first.beginMeta(); entry != first.endMeta(); ++entry) {
         const std::string& key = entry->first;
         if (!key.starts_with("bilayer:") || key == metadata::signUndecided) continue;

@@ -146,9 +146,6 @@ void useTiles(const fs::path& folder, ByteSource& bytes, bool isValid) {
             (void)field.closest(point, 1);
             (void)field.raycast({point, {1, 0.5f, 0.25f}, 10});
         }
-    } catch (const std::invalid_argument& error) {
-        require(!isValid, error.what());
-        requirePlainError(error.what());
     } catch (const std::runtime_error& error) {
         require(!isValid, error.what());
         require(std::string(error.what()).starts_with(folder.string()), "an error does not name the file");
