@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <iterator>
 #include <thread>
 
 #include <bilayer/sdf/mesh_io.h>
@@ -130,6 +131,19 @@ TEST_CASE("the peak memory of a mesh is its own, not that of a mesh before it") 
     const double large = records.at("a.ply")["peakBytes"], small = records.at("b.ply")["peakBytes"];
     CAPTURE(large, small);
     CHECK(small < large / 2);
+}
+
+TEST_CASE("a process that converts meshes has no more threads than it may use") {
+    const fs::path library = boxLibrary("threads", smallCount), output = emptyFolder("threads_fields");
+    writeMesh(library / "z.ply", shapes::sphere(hugeRadius / 2, 5));  // the last one takes a while
+    const pid_t batch = start(batchWords(library, output, {"--threads", "1"}));
+    const auto children = childrenOf(batch, 1);
+    REQUIRE(children.size() == 1);
+    while (fieldsIn(output).size() < smallCount && ::kill(batch, 0) == 0)
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    const fs::directory_iterator threads("/proc/" + std::to_string(children[0]) + "/task");
+    CHECK(std::distance(begin(threads), end(threads)) == 1);
+    CHECK(wait(batch) == 0);
 }
 
 TEST_CASE("an interrupted batch leaves no half file, and continues where it was") {

@@ -72,9 +72,8 @@ std::map<std::string, std::string> fieldsIn(const fs::path& folder) {
 
 std::vector<std::string> leftovers(const fs::path& output) {
     std::vector<std::string> found;
-    for (const char* folder : {"work", "locks"})
-        for (const auto& entry : fs::recursive_directory_iterator(output / ".bilayer" / folder))
-            found.push_back(entry.path().string());
+    for (const auto& entry : fs::recursive_directory_iterator(output / ".bilayer/work"))
+        found.push_back(entry.path().string());
     return found;
 }
 

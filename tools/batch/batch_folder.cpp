@@ -12,7 +12,7 @@
 namespace bilayer::tools {
 
 void BatchFolder::create() const {
-    for (const char* name : {"records", "locks", "work", "thumbnails"}) {
+    for (const char* name : {"records", "work", "thumbnails"}) {
         std::error_code error;
         std::filesystem::create_directories(own() / name, error);
         if (error)
@@ -21,11 +21,7 @@ void BatchFolder::create() const {
 }
 
 std::filesystem::path BatchFolder::thumbnail(const std::string& name) const {
-    return own() / "thumbnails" / (key(name) + ".png");
-}
-
-std::string BatchFolder::key(const std::string& name) {
-    return hex(detail::contentHash(name));
+    return own() / "thumbnails" / (hex(detail::contentHash(name)) + ".png");
 }
 
 }  // namespace bilayer::tools

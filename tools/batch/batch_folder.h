@@ -9,7 +9,7 @@
 namespace bilayer::tools {
 
 /// The output folder of a batch. The field of the mesh "a/b.obj" is "a/b.obj.vdb". All else is in ".bilayer": records,
-/// locks, thumbnails, and a work folder for each mesh that is being converted.
+/// thumbnails, a file for locks, and work folders of the processes that convert meshes.
 class BatchFolder {
   public:
     explicit BatchFolder(std::filesystem::path root) : root_(std::move(root)) {}
@@ -20,13 +20,12 @@ class BatchFolder {
     std::filesystem::path root() const { return root_; }
     std::filesystem::path records() const { return own() / "records"; }
     std::filesystem::path field(const std::string& name) const { return root_ / (name + ".vdb"); }
-    std::filesystem::path lock(const std::string& name) const { return own() / "locks" / key(name); }
-    std::filesystem::path work(const std::string& name) const { return own() / "work" / key(name); }
+    std::filesystem::path locks() const { return own() / "lock"; }
+    std::filesystem::path work() const { return own() / "work"; }
     std::filesystem::path thumbnail(const std::string& name) const;
 
   private:
     std::filesystem::path own() const { return root_ / ".bilayer"; }
-    static std::string key(const std::string& name);
 
     std::filesystem::path root_;
 };

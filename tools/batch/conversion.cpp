@@ -9,6 +9,7 @@
 #include <fstream>
 #include <memory>
 #include <new>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -161,10 +162,20 @@ class Conversion {
     double hashSeconds_ = 0;
 };
 
+// Limits the threads of this process until the next call. A limit that ended with each mesh would start the threads
+// that it has held back, which then look for work on the cores of other meshes.
+void limitThreads(int count) {
+    static std::optional<tbb::global_control> limit;
+    const auto parallelism = tbb::global_control::max_allowed_parallelism;
+    if (limit && tbb::global_control::active_value(parallelism) == std::size_t(count)) return;
+    limit.reset();
+    limit.emplace(parallelism, std::size_t(count));
+}
+
 }  // namespace
 
 Json convert(const ConversionOptions& options, const ConversionTask& task) {
-    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, std::size_t(task.threads));
+    limitThreads(task.threads);
     Json record;
     try {
         record["outcome"] = Conversion(options, task, record).run();

@@ -13,9 +13,10 @@
 #include <system_error>
 
 #include "sdf/io/content_hash.h"
-#include "tools/batch/output_lock.h"
+#include "tools/batch/output_locks.h"
 #include "tools/batch/records.h"
 #include "tools/batch/signal_watch.h"
+#include "tools/batch/work_folder.h"
 
 namespace bilayer::tools {
 namespace {
@@ -27,13 +28,19 @@ constexpr int lockInterval = 200, progressInterval = 500;
 // A process that has used more memory converts no other mesh: it would keep a part of it.
 constexpr std::uint64_t maxReusedMemory = 128 << 20;
 
-/// A mesh whose worker runs.
+/// A worker and the folder where it writes.
+struct Workplace {
+    WorkFolder folder;
+    Worker worker;
+};
+
+/// A mesh that a worker converts.
 struct RunningMesh {
     const BatchMesh* mesh;
     WorkerTask task;
     OutputLock lock;
     Stopwatch watch;
-    std::unique_ptr<Worker> worker;
+    std::unique_ptr<Workplace> place;
 };
 
 /// Moves what a worker has made to its place. Returns an error, or nothing.
@@ -51,17 +58,12 @@ class Scheduler {
   public:
     explicit Scheduler(const BatchPlan& plan)
         : plan_(plan),
+          locks_(plan.folder.locks()),
           records_(plan.folder.records(), plan.shard),
           optionsHash_(hex(detail::contentHash(plan.conversion.optionsText))) {
         for (const BatchMesh& mesh : plan.meshes) waiting_.push_back(&mesh);
         result_.counts.total = plan.meshes.size();
-    }
-
-    ~Scheduler() {
-        for (const auto& running : running_) {
-            running->worker.reset();
-            clean(*running->mesh);
-        }
+        removeAbandoned(plan.folder.work(), locks_);
     }
 
     BatchResult run() {
@@ -106,33 +108,35 @@ class Scheduler {
     }
 
     void tryToStart(const BatchMesh* mesh, bool isLarge) {
-        std::optional<OutputLock> lock = OutputLock::take(plan_.folder.lock(mesh->name));
+        std::optional<OutputLock> lock = locks_.take(mesh->name);
         if (!lock) {
             locked_.push_back(mesh);
             return;
         }
-        makeWorkFolder(*mesh);
         const WorkerTask task{.mesh = std::size_t(mesh - plan_.meshes.data()),
                               .threads = isLarge ? plan_.threads : threadsOfSmall(),
                               .isLarge = isLarge};
-        std::unique_ptr<Worker> worker = idle_.empty() ? newWorker() : std::move(idle_.back());
+        std::unique_ptr<Workplace> place = idle_.empty() ? newWorkplace() : std::move(idle_.back());
         if (!idle_.empty()) idle_.pop_back();
-        running_.push_back(std::unique_ptr<RunningMesh>(
-            new RunningMesh{mesh, task, std::move(*lock), Stopwatch(), std::move(worker)}));
-        running_.back()->worker->begin(task);
+        running_.push_back(
+            std::unique_ptr<RunningMesh>(new RunningMesh{mesh, task, std::move(*lock), Stopwatch(), std::move(place)}));
+        running_.back()->place->worker.begin(task);
     }
 
-    std::unique_ptr<Worker> newWorker() const {
-        return std::make_unique<Worker>(plan_.limits, [this](const WorkerTask& task) {
-            return convert(task).dump(-1, ' ', false, Json::error_handler_t::replace);
-        });
+    std::unique_ptr<Workplace> newWorkplace() {
+        const std::string name = fmt::format("{}.{}", records_.path().stem().string(), workplaceCount_++);
+        const fs::path folder = plan_.folder.work() / name;
+        const auto work = [this, folder](const WorkerTask& task) {
+            return convert(task, folder).dump(-1, ' ', false, Json::error_handler_t::replace);
+        };
+        return std::unique_ptr<Workplace>(new Workplace{{folder, locks_}, {plan_.limits, work}});
     }
 
-    Json convert(const WorkerTask& task) const {
+    Json convert(const WorkerTask& task, const fs::path& folder) const {
         const BatchMesh& mesh = plan_.meshes[task.mesh];
         return tools::convert(plan_.conversion, {.mesh = mesh.file,
                                                  .output = plan_.folder.field(mesh.name),
-                                                 .work = plan_.folder.work(mesh.name),
+                                                 .work = folder,
                                                  .threads = task.threads,
                                                  .mayBeLarge = task.isLarge || plan_.threads == 1});
     }
@@ -142,8 +146,9 @@ class Scheduler {
         std::vector<pollfd> files{{signals_.file(), POLLIN, 0}};
         int timeout = locked_.empty() ? progressInterval : lockInterval;
         for (const auto& running : running_) {
-            files.push_back({running->worker->socket(), POLLIN, 0});
-            if (const int left = running->worker->millisecondsLeft(); left >= 0) timeout = std::min(timeout, left);
+            files.push_back({running->place->worker.socket(), POLLIN, 0});
+            if (const int left = running->place->worker.millisecondsLeft(); left >= 0)
+                timeout = std::min(timeout, left);
         }
         if (::poll(files.data(), files.size(), timeout) < 0 && errno != EINTR)
             throw std::system_error(errno, std::generic_category(), "poll");
@@ -157,7 +162,7 @@ class Scheduler {
 
     void settleEnded() {
         for (std::size_t i = running_.size(); i-- > 0;) {
-            Worker& worker = *running_[i]->worker;
+            Worker& worker = running_[i]->place->worker;
             const bool hasEnded = ready_[i] && !worker.read();
             if (!hasEnded && worker.millisecondsLeft() != 0) continue;
             const WorkerEnd end = worker.finish();
@@ -167,48 +172,34 @@ class Scheduler {
             }
             settle(*running_[i], end);
             if (!end.answer.empty() && end.peakMemory <= maxReusedMemory)
-                idle_.push_back(std::move(running_[i]->worker));
+                idle_.push_back(std::move(running_[i]->place));
             running_.erase(running_.begin() + std::ptrdiff_t(i));
         }
     }
 
     // What meshes before this one have left in the process may be why it failed: a new process decides.
     void tryAlone(RunningMesh& running) {
-        makeWorkFolder(*running.mesh);
-        running.worker = newWorker();
-        running.worker->begin(running.task);
+        running.place = newWorkplace();
+        running.place->worker.begin(running.task);
     }
 
     void settle(const RunningMesh& running, const WorkerEnd& end) {
         const BatchMesh& mesh = *running.mesh;
         Json known = Json::parse(end.answer, nullptr, /*allow_exceptions=*/false);
         if (!known.is_object()) known = {{"outcome", "failed"}, {"reason", end.reason}, {"error", end.error}};
-        const fs::path work = plan_.folder.work(mesh.name);
-        std::error_code absent;
-        fs::rename(work / workThumbnail, plan_.folder.thumbnail(mesh.name), absent);
+        const fs::path& work = running.place->folder.path();
+        std::error_code error;
+        fs::rename(work / workThumbnail, plan_.folder.thumbnail(mesh.name), error);
+        if (error) fs::remove(work / workThumbnail, error);  // the next mesh may have none
         if (known["outcome"] == "done")
             if (const std::string error = moveTo(work / workField, plan_.folder.field(mesh.name)); !error.empty())
                 known.update(Json{{"outcome", "failed"}, {"reason", "error"}, {"error", error}});
-        clean(mesh);
         if (known["outcome"] == "large") {
             large_.push_back(&mesh);
             return;
         }
         count(mesh, known);
         record(running, end, known);
-    }
-
-    // An empty one, in place of what a process that was killed has left.
-    void makeWorkFolder(const BatchMesh& mesh) {
-        const fs::path work = plan_.folder.work(mesh.name);
-        if (fs::create_directory(work)) return;
-        fs::remove_all(work);
-        fs::create_directory(work);
-    }
-
-    void clean(const BatchMesh& mesh) {
-        std::error_code absent;
-        fs::remove_all(plan_.folder.work(mesh.name), absent);
     }
 
     void count(const BatchMesh& mesh, const Json& known) {
@@ -241,13 +232,15 @@ class Scheduler {
 
     const BatchPlan& plan_;
     const SignalWatch signals_;
+    const OutputLocks locks_;
     RecordFile records_;
     const std::string optionsHash_;
     ProgressLine progress_;
     BatchResult result_;
     std::deque<const BatchMesh*> waiting_, large_, locked_;
     std::vector<std::unique_ptr<RunningMesh>> running_;
-    std::vector<std::unique_ptr<Worker>> idle_;
+    std::vector<std::unique_ptr<Workplace>> idle_;
+    int workplaceCount_ = 0;   // that there have been
     std::vector<bool> ready_;  // of each running mesh: whether its worker has something to read
 };
 
