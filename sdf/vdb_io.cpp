@@ -16,6 +16,7 @@
 #include "sdf/grid/distance_check.h"
 #include "sdf/grid/vdb_grids.h"
 #include "sdf/io/atomic_file.h"
+#include "sdf/io/input_file.h"
 #include "sdf/io/vdb_archive.h"
 #include "sdf/io/vdb_checksum.h"
 
@@ -63,13 +64,11 @@ void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const
 
 LevelSet readVdb(const std::filesystem::path& path) {
     std::shared_ptr<Grids> grids = readGrids(path);
-    try {
-        const LevelSet levelSet(std::move(grids));
+    return namingFile(path, [&] {
+        LevelSet levelSet(std::move(grids));
         requireValidDistances(*levelSet.grids().distance, levelSet.interiorWidth());
         return levelSet;
-    } catch (const std::invalid_argument& error) {
-        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
-    }
+    });
 }
 
 }  // namespace bilayer

@@ -22,6 +22,7 @@
 #include "collider/field/field_data.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/base/quoted_text.h"
+#include "sdf/io/input_file.h"
 #include "sdf/sign/sign_choice.h"
 
 namespace bilayer::detail {
@@ -274,11 +275,7 @@ Body bodyOf(const LevelSet& levelSet) {
 StoredField readStored(const std::filesystem::path& path) {
     StoredField stored{readVdb(path), std::nullopt};
     if (!hasBody(stored.levelSet)) return stored;
-    try {
-        stored.body = bodyOf(stored.levelSet);
-    } catch (const std::invalid_argument& error) {
-        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
-    }
+    stored.body = namingFile(path, [&] { return bodyOf(stored.levelSet); });
     return stored;
 }
 

@@ -18,6 +18,7 @@
 #include "sdf/base/openvdb.h"
 #include "sdf/grid/distance_check.h"
 #include "sdf/grid/vdb_grids.h"
+#include "sdf/io/input_file.h"
 #include "sdf/tiles/tile_merge.h"
 
 namespace bilayer::detail {
@@ -36,16 +37,6 @@ bool overlap(const PlacedTile& a, const PlacedTile& b, int margin) {
     const glm::ivec3 reach(margin);
     return glm::all(glm::lessThan(a.first - reach, b.first + blockEdgeVoxels * b.blocks)) &&
            glm::all(glm::lessThan(b.first, a.first + blockEdgeVoxels * a.blocks + reach));
-}
-
-/// Calls work(), and names a file in its errors.
-template <class Work>
-auto named(const std::filesystem::path& path, const Work& work) {
-    try {
-        return work();
-    } catch (const std::invalid_argument& error) {
-        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
-    }
 }
 
 /// The grids of a tile's file; the distances with those of its border.
@@ -69,9 +60,9 @@ void requireWithin(const TileRecord& tile, std::span<const SurfaceBlock> blocks)
 TiledFieldData::TiledFieldData(const std::filesystem::path& folder, std::size_t budget, Storage storage)
     : manifest_(readTileManifest(folder)), storage_(storage) {
     readSurface();
-    named(folder, [&] { readFrame(); });
+    namingFile(folder, [&] { readFrame(); });
     placeTiles();
-    named(folder, [&] { requireSizes(); });
+    namingFile(folder, [&] { requireSizes(); });
     std::vector<std::size_t> sizes;
     for (std::size_t tile = 0; tile < tileCount(); ++tile) sizes.push_back(bytesOf(tile));
     cache_ = std::make_unique<TileCache>(budget, std::move(sizes), [this](std::size_t tile) { return read(tile); });
@@ -109,7 +100,7 @@ void TiledFieldData::readFrame() {
     }
     if (!smallest || surface_.empty()) throw std::invalid_argument("has no voxel in its band");
     const TileRecord& record = manifest_.tiles[*smallest];
-    const LevelSet tile = named(record.field.path, [&] { return LevelSet(gridsOf(record)); });
+    const LevelSet tile = namingFile(record.field.path, [&] { return LevelSet(gridsOf(record)); });
     const openvdb::FloatGrid& grid = *tile.grids().distance;
     Grids pattern;
     pattern.distance = grid.copyWithNewTree();
@@ -213,7 +204,7 @@ std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
         grids.distance = grid;
     } else {
         grids.distance = gridsOf(record)->distance;
-        named(record.field.path, [&] {
+        namingFile(record.field.path, [&] {
             requireSameField(*pattern_->distance, *grids.distance);
             requireValidDistances(*grids.distance, frame_.interiorWidth);
         });

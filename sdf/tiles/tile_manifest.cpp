@@ -81,6 +81,19 @@ bool isInLine(const TileManifest& manifest, const glm::ivec3& place, int axis) {
            (place[axis] == 0 || box.first[axis] == manifest.tiles[manifest.at(before)].box.end[axis]);
 }
 
+void requireBoxes(const TileManifest& manifest, const glm::ivec3& place) {
+    const TileRecord& tile = manifest.tiles[manifest.at(place)];
+    const auto refuse = [&](const std::string& why) {
+        throw std::runtime_error(fmt::format("tile {} {} {}: {}", place.x, place.y, place.z, why));
+    };
+    if (!isWithin(tile.box, tile.box) || !isInLine(manifest, place, 0) || !isInLine(manifest, place, 1) ||
+        !isInLine(manifest, place, 2))
+        refuse(fmt::format("its box must be of whole blocks of {} voxels, begin where the tile before it ends, and be as "
+                           "long as the others of its layer",
+                           blockSide));
+    if (tile.hasBand && !isWithin(tile.band, tile.box)) refuse("its band must lie in its box");
+}
+
 void requireOrder(const TileManifest& manifest) {
     const glm::ivec3& counts = manifest.counts;
     if (glm::any(glm::lessThan(counts, glm::ivec3(1))) ||
@@ -90,18 +103,7 @@ void requireOrder(const TileManifest& manifest) {
     glm::ivec3 place(0);
     for (place.x = 0; place.x < counts.x; ++place.x)
         for (place.y = 0; place.y < counts.y; ++place.y)
-            for (place.z = 0; place.z < counts.z; ++place.z) {
-                const TileRecord& tile = manifest.tiles[manifest.at(place)];
-                const std::string name = fmt::format("tile {} {} {}", place.x, place.y, place.z);
-                if (!isWithin(tile.box, tile.box) || !isInLine(manifest, place, 0) || !isInLine(manifest, place, 1) ||
-                    !isInLine(manifest, place, 2))
-                    throw std::runtime_error(
-                        fmt::format("{}: its box must be of whole blocks of {} voxels, begin where the tile before it "
-                                    "ends, and be as long as the others of its layer",
-                                    name, blockSide));
-                if (tile.hasBand && !isWithin(tile.band, tile.box))
-                    throw std::runtime_error(name + ": its band must lie in its box");
-            }
+            for (place.z = 0; place.z < counts.z; ++place.z) requireBoxes(manifest, place);
 }
 
 }  // namespace

@@ -8,7 +8,9 @@ build=$1
 report() { # PROFILE SOURCES...: lines of files and their total
   llvm-cov-14 report "$build/fuzzer" --instr-profile="$1" --show-functions=false "${@:2}"
 }
-total() { report "$@" 2> >(grep -v "functions have mismatched data" >&2) | awk '/^TOTAL/ { print $10; n = 1 } END { exit !n }'; }  # of lines, in LLVM 14
+total() { # PROFILE SOURCES...: the share of lines, which LLVM 14 prints as the tenth word
+  report "$@" 2> >(grep -v "functions have mismatched data" >&2) | awk '/^TOTAL/ { print $10; n = 1 } END { exit !n }'
+}
 
 printf '%-14s %10s %10s %10s %10s\n' fuzzer sdf/mesh sdf/io sdf collider
 for folder in "$build"/profiles/*/; do

@@ -18,10 +18,6 @@ Json triple(const glm::ivec3& v) {
     return Json::array({v.x, v.y, v.z});
 }
 
-glm::ivec3 integers(const Json& json) {
-    return {json.at(0).get<int>(), json.at(1).get<int>(), json.at(2).get<int>()};
-}
-
 template <class Vec>
 Vec numbers(const Json& json) {
     using Scalar = typename Vec::value_type;
@@ -173,7 +169,7 @@ Json recordOf(const glm::ivec3& place, const BlockBox& box, std::uint64_t triang
 }
 
 glm::ivec3 placeOf(const Json& record) {
-    return integers(record.at("tile"));
+    return numbers<glm::ivec3>(record.at("tile"));
 }
 
 // A tile without leaves is all on one side, and so are the voxels on its neighbours' faces towards it.
