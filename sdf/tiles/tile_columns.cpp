@@ -5,16 +5,14 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <fstream>
 #include <glm/common.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "sdf/grid/field_part.h"
-#include "sdf/io/atomic_file.h"
-#include "sdf/io/input_file.h"
 #include "sdf/sign/triangle_columns.h"
+#include "sdf/tiles/hashed_record.h"
 
 namespace bilayer::detail {
 namespace {
@@ -80,34 +78,19 @@ ColumnSums crossingsBelow(const Tiling& tiling, std::size_t tile,
 
 void writeColumnSums(const std::filesystem::path& path, const ColumnSums& sums) {
     const ColumnSums inner = trimmed(sums);
-    const std::int32_t box[4] = {inner.first().x, inner.first().y, inner.end().x, inner.end().y};
-    AtomicFile file(path);
-    std::ofstream stream(file.temporary(), std::ios::binary | std::ios::trunc);
-    stream.write(reinterpret_cast<const char*>(box), sizeof box);
-    stream.write(reinterpret_cast<const char*>(inner.values().data()),
-                 std::streamsize(inner.values().size() * sizeof(std::int32_t)));
-    stream.close();
-    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-    file.commit();
+    HashedRecordWriter record;
+    record.add(inner.first());
+    record.add(inner.end());
+    record.add(std::vector<std::int32_t>(inner.values().begin(), inner.values().end()));
+    record.write(path);
 }
 
 ColumnSums readColumnSums(const std::filesystem::path& path) {
-    requireInputFile(path);
-    std::int32_t box[4] = {};
-    std::ifstream stream(path, std::ios::binary);
-    stream.read(reinterpret_cast<char*>(box), sizeof box);
-    const std::uint64_t bytes = std::filesystem::file_size(path);
-    const auto side = [&](int axis) {
-        return std::uint64_t(std::max<std::int64_t>(std::int64_t(box[axis + 2]) - box[axis], 0));
-    };
-    // a product of two sides below 2^32 fits
-    const bool fits =
-        bool(stream) && side(0) * side(1) <= bytes && bytes == sizeof box + side(0) * side(1) * sizeof(std::int32_t);
-    if (!fits) throw std::runtime_error(fmt::format("{}: is no file of column sums: remove the folder", path.string()));
-    ColumnSums sums({box[0], box[1]}, {box[2], box[3]});
-    stream.read(reinterpret_cast<char*>(sums.values().data()),
-                std::streamsize(sums.values().size() * sizeof(std::int32_t)));
-    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be read", path.string()));
+    HashedRecordReader record(path);
+    const auto first = record.value<glm::ivec2>(), end = record.value<glm::ivec2>();
+    ColumnSums sums(first, end);
+    const auto values = record.values<std::int32_t>();
+    std::copy(values.begin(), values.end(), sums.values().begin());
     return sums;
 }
 

@@ -88,9 +88,10 @@ void requireBoxes(const TileManifest& manifest, const glm::ivec3& place) {
     };
     if (!isWithin(tile.box, tile.box) || !isInLine(manifest, place, 0) || !isInLine(manifest, place, 1) ||
         !isInLine(manifest, place, 2))
-        refuse(fmt::format("its box must be of whole blocks of {} voxels, begin where the tile before it ends, and be as "
-                           "long as the others of its layer",
-                           blockSide));
+        refuse(
+            fmt::format("its box must be of whole blocks of {} voxels, begin where the tile before it ends, and be as "
+                        "long as the others of its layer",
+                        blockSide));
     if (tile.hasBand && !isWithin(tile.band, tile.box)) refuse("its band must lie in its box");
 }
 

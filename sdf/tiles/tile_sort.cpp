@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
 #include "sdf/fill/triangle_limits.h"
+#include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
 
 namespace bilayer::detail {
@@ -28,6 +30,15 @@ double areaWithin(const TriangleCorners& c, const TriangleLimits& limits, double
     const glm::dvec3 &a = c[longest], &b = c[(longest + 1) % 3], &p = c[(longest + 2) % 3];
     const glm::dvec3 middle = 0.5 * (a + b);
     return areaWithin({a, middle, p}, limits, edge) + areaWithin({middle, b, p}, limits, edge);
+}
+
+/// Returns a hash that is continued by a triangle.
+std::uint64_t hashWith(std::uint64_t hash, const TileTriangle& triangle) {
+    std::uint64_t words[sizeof triangle / sizeof(std::uint64_t)];
+    static_assert(sizeof words == sizeof triangle);
+    std::memcpy(words, &triangle, sizeof words);
+    for (const std::uint64_t word : words) hash = mixedHash(hash, word);
+    return hash;
 }
 
 /// The file of one tile. It is open only while its buffer is written: there may be more tiles than open files.
@@ -68,6 +79,7 @@ std::vector<TileLoad> sortTriangles(const TriangleSource& source, Tiling& tiling
             const TriangleCorners corners{at(0), at(1), at(2)};
             tiling.forEachTileOf(corners, [&](std::size_t tile) {
                 ++loads[tile].triangles;
+                loads[tile].hash = hashWith(loads[tile].hash, t);
                 loads[tile].area += areaWithin(corners, tiling.limits(tile), double(tiling.brickSide()));
                 files[tile].add(t, room, fileOf(tile));
             });
@@ -77,17 +89,28 @@ std::vector<TileLoad> sortTriangles(const TriangleSource& source, Tiling& tiling
     return loads;
 }
 
-std::vector<TileTriangle> readTileTriangles(const std::filesystem::path& path, std::uint64_t count) {
-    std::vector<TileTriangle> triangles(count);
-    if (count == 0) return triangles;
+std::vector<TileTriangle> readTileTriangles(const std::filesystem::path& path, const TileLoad& load) {
+    std::vector<TileTriangle> triangles(load.triangles);
+    if (load.triangles == 0) return triangles;
     requireInputFile(path);
-    if (std::filesystem::file_size(path) != count * sizeof(TileTriangle))
-        throw std::runtime_error(fmt::format("{}: has {} bytes, but {} triangles have {}", path.string(),
-                                             std::filesystem::file_size(path), count, count * sizeof(TileTriangle)));
+    const std::uint64_t size = load.triangles * sizeof(TileTriangle);
     std::ifstream stream(path, std::ios::binary);
-    stream.read(reinterpret_cast<char*>(triangles.data()), std::streamsize(count * sizeof(TileTriangle)));
-    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be read", path.string()));
+    stream.read(reinterpret_cast<char*>(triangles.data()), std::streamsize(size));
+    std::uint64_t hash = 0;
+    for (const TileTriangle& triangle : triangles) hash = hashWith(hash, triangle);
+    if (!stream || std::filesystem::file_size(path) != size || hash != load.hash)
+        throw std::runtime_error(
+            fmt::format("{}: is damaged: repeat the command, which writes it again", path.string()));
     return triangles;
+}
+
+bool hasTileTriangles(const std::filesystem::path& path, const TileLoad& load) {
+    try {
+        readTileTriangles(path, load);
+        return true;
+    } catch (const std::runtime_error&) {
+        return false;
+    }
 }
 
 }  // namespace bilayer::detail

@@ -17,7 +17,8 @@ namespace bilayer::detail {
 /// What a tile must hold.
 struct TileLoad {
     std::uint64_t triangles = 0;
-    double area = 0;  ///< within the tile's limits [voxels^2]
+    double area = 0;         ///< within the tile's limits [voxels^2]
+    std::uint64_t hash = 0;  ///< of the triangles
 };
 
 /// Writes the triangles of each tile to a file, in the order of the mesh. Replaces existing files. Its buffers take at
@@ -27,8 +28,11 @@ struct TileLoad {
 std::vector<TileLoad> sortTriangles(const TriangleSource& source, Tiling& tiling, float voxelSize,
                                     const std::function<std::filesystem::path(std::size_t)>& fileOf);
 
-/// Reads a file that sortTriangles() wrote. Throws std::runtime_error that names it if its size is not that of `count`
-/// triangles.
-std::vector<TileTriangle> readTileTriangles(const std::filesystem::path& path, std::uint64_t count);
+/// Reads a file that sortTriangles() wrote for this load. Throws std::runtime_error that names it if its triangles are
+/// not those.
+std::vector<TileTriangle> readTileTriangles(const std::filesystem::path& path, const TileLoad& load);
+
+/// Returns whether readTileTriangles() does not throw.
+bool hasTileTriangles(const std::filesystem::path& path, const TileLoad& load);
 
 }  // namespace bilayer::detail

@@ -124,8 +124,20 @@ TEST_CASE("triangles are sorted into one file per tile, in order") {
                 if (of == tile) expected.push_back(t);
             });
         }
-        CHECK(same(readTileTriangles(fileOf(tile), loads[tile].triangles), expected));
-        CHECK_THROWS_WITH(readTileTriangles(fileOf(tile), loads[tile].triangles + 1), Contains("bytes, but"));
+        CHECK(same(readTileTriangles(fileOf(tile), loads[tile]), expected));
+        if (expected.empty()) continue;
+        const TileLoad more{loads[tile].triangles + 1, 0, loads[tile].hash},
+            fewer{loads[tile].triangles - 1, 0, loads[tile].hash};
+        for (const TileLoad& other : {more, fewer})
+            CHECK_THROWS_WITH(readTileTriangles(fileOf(tile), other), Contains("is damaged"));
+        std::fstream file(fileOf(tile), std::ios::binary | std::ios::in | std::ios::out);
+        const auto at = std::streamoff(std::filesystem::file_size(fileOf(tile)) / 2);
+        file.seekg(at);
+        const auto byte = char(file.get() ^ 1);
+        file.seekp(at);
+        file.put(byte);
+        file.close();
+        CHECK_THROWS_WITH(readTileTriangles(fileOf(tile), loads[tile]), Contains("is damaged"));
         area += loads[tile].area;
     }
     // all of the sphere, and what two tiles share

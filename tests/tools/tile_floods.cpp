@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// `bilayer build --tiles` with signs by flood: the bytes of `bilayer build`, also after a run was killed.
+// `bilayer build --tiles` with signs by flood: the bytes of `bilayer build`. Builds with any signs that were killed.
 #include <unistd.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,12 +41,33 @@ fs::path shellsFile() {
     return path;
 }
 
-// Runs it until a file appears.
-void killWhenThere(const Words& words, const fs::path& file) {
+std::vector<fs::path> filesIn(const fs::path& folder) {
+    std::error_code absent;
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(folder, absent)) files.push_back(entry.path());
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+// Runs it until a file of this kind appears in the work folder.
+void killWhenThere(const Words& words, const fs::path& folder, const std::string& ending) {
     const pid_t process = start(words);
-    for (int i = 0; i < 20000 && !fs::exists(file); ++i) ::usleep(1000);
+    const auto isThere = [&] {
+        const std::vector<fs::path> files = filesIn(folder / "work");
+        return std::any_of(files.begin(), files.end(), [&](const fs::path& f) { return f.extension() == ending; });
+    };
+    for (int i = 0; i < 20000 && !isThere(); ++i) ::usleep(1000);
     ::kill(process, SIGKILL);
     REQUIRE(wait(process) == 128 + SIGKILL);
+}
+
+// Changes a byte, or cuts the file.
+void damage(const fs::path& path, std::mt19937& random) {
+    const auto at = std::streamoff(random() % fs::file_size(path));
+    if (random() % 3 == 0) return fs::resize_file(path, std::uintmax_t(at));
+    std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+    const char old = char(file.seekg(at).get());
+    file.seekp(at).put(char(old + 1));
 }
 
 const Words size{"--resolution", "120"}, flood{"--resolution", "120", "--sign", "flood"};
@@ -95,30 +118,42 @@ TEST_CASE("a damaged tile of a flood is built again") {
     CHECK(other.err.find("other options") != std::string::npos);
 }
 
-TEST_CASE("a flood that was killed goes on, and finds damaged files") {
+TEST_CASE("a build in tiles that was killed goes on, and finds damaged files of all kinds") {
     const unsigned seed = test::seed();
-    CAPTURE(seed);
+    const std::string sign = GENERATE("normals", "winding", "flood");
+    CAPTURE(seed, sign);
     std::mt19937 random(seed);
-    const fs::path mesh = shellsFile(), folder = scratch("flood killed");
-    const Words words = tiled(mesh, folder, "3x2x2", flood);
-    const LevelSet whole = inOnePiece(mesh, flood);
-    for (int round = 0; round < 4; ++round) {
-        fs::remove_all(folder);
-        std::vector<fs::path> work;
-        killWhenThere(words, folder / "work" / (round % 2 ? "tile_0_0_0.json" : "all.regions"));
-        for (const auto& entry : fs::directory_iterator(folder / "work"))
-            if (const auto ending = entry.path().extension(); ending == ".border" || ending == ".distances")
-                work.push_back(entry.path());
-        REQUIRE(!work.empty());
-        const fs::path damaged = work[random() % work.size()];
+    const Words options{"--resolution", "120", "--sign", sign};
+    const fs::path mesh = sign == "flood" ? shellsFile() : scratch("torus.ply"), folder = scratch("killed"),
+                   copy = scratch("killed copy");
+    if (sign != "flood") writeMesh(mesh, shapes::torus(1, 0.4f, 96, 48));
+    const Words words = tiled(mesh, folder, "3x2x2", options);
+    const LevelSet whole = inOnePiece(mesh, options);
+    fs::remove_all(folder);
+    fs::remove_all(copy);
+    killWhenThere(words, folder, ".record");
+    fs::copy(folder, copy, fs::copy_options::recursive);
+    std::set<std::string> kinds;
+    for (const fs::path& file : filesIn(folder / "work")) kinds.insert(file.extension().string());
+    CHECK(kinds.count(".triangles") == 1);
+    CHECK(kinds.count(".sums") == (sign == "winding"));
+    CHECK(kinds.count(".border") == (sign == "flood"));
+    for (const std::string& kind : kinds) {
+        std::vector<fs::path> files = filesIn(folder / "work");
+        std::erase_if(files,
+                      [&](const fs::path& file) { return file.extension() != kind || fs::file_size(file) == 0; });
+        if (files.empty()) continue;
+        const fs::path damaged = files[random() % files.size()];
         CAPTURE(damaged.string());
-        const auto at = std::streamoff(random() % fs::file_size(damaged));
-        std::fstream file(damaged, std::ios::binary | std::ios::in | std::ios::out);
-        const char old = char(file.seekg(at).get());
-        file.seekp(at).put(char(old + 1));
-        file.close();
+        damage(damaged, random);
+        if (kind == ".plan") {
+            checkRefusal(words, 1, "remove the folder");
+            fs::remove_all(folder / "work");
+        }
         built(words);
         CHECK(sameFields(merged(folder), whole));
+        fs::remove_all(folder);
+        fs::copy(copy, folder, fs::copy_options::recursive);
     }
 }
 }  // namespace bilayer::tile_floods_test

@@ -102,7 +102,7 @@ TEST_CASE("a build that was killed continues with the missing tiles") {
     // what is there stays: a file of the first run keeps its time
     std::map<fs::path, fs::file_time_type> times;
     for (const auto& entry : fs::directory_iterator(folder / "work"))
-        if (entry.path().extension() == ".json" && entry.path().stem() != "plan") {
+        if (entry.path().extension() == ".record") {
             const fs::path field = folder / (entry.path().stem().string() + ".vdb");
             if (fs::exists(field)) times[field] = fs::last_write_time(field);
         }

@@ -2,6 +2,7 @@
 #include "tools/tiles/column_files.h"
 
 #include <filesystem>
+#include <stdexcept>
 
 #include "sdf/tiles/tile_columns.h"
 
@@ -9,11 +10,22 @@ namespace bilayer::tools {
 
 using namespace bilayer::detail;
 
+// A killed run may have left a tile's file.
+bool ColumnFiles::isWritten(const std::filesystem::path& file) const {
+    if (!std::filesystem::exists(file)) return false;
+    try {
+        readColumnSums(file);
+        return true;
+    } catch (const std::runtime_error&) {
+        return false;  // it is damaged
+    }
+}
+
 void ColumnFiles::write(std::size_t tile) const {
     const glm::ivec3 place = tiling_.place(tile);
-    const std::uint64_t count = plan_.loads()[tile].triangles;
-    if (count == 0 || std::filesystem::exists(folder_.sums(place))) return;
-    const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), count);
+    const TileLoad& load = plan_.loads()[tile];
+    if (load.triangles == 0 || isWritten(folder_.sums(place))) return;
+    const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), load);
     writeColumnSums(folder_.sums(place), crossingsOf(triangles, tiling_, tile, plan_.voxelSize()));
 }
 

@@ -17,8 +17,8 @@ class ColumnFiles {
     ColumnFiles(const TileFolder& folder, const TilePlan& plan, const detail::Tiling& tiling)
         : folder_(folder), plan_(plan), tiling_(tiling) {}
 
-    /// Writes the sums of a tile with triangles, unless they are there. Throws as crossingsOf() and writeColumnSums()
-    /// do.
+    /// Writes the sums of a tile with triangles, unless they are there and intact. Throws as crossingsOf() and
+    /// writeColumnSums() do.
     void write(std::size_t tile) const;
 
     /// Returns the sums below a tile, of files that all ranks have written.
@@ -27,6 +27,8 @@ class ColumnFiles {
     std::uint64_t readBytes() const { return readBytes_; }  ///< of files, in all
 
   private:
+    bool isWritten(const std::filesystem::path& file) const;
+
     const TileFolder& folder_;
     const TilePlan& plan_;
     const detail::Tiling& tiling_;

@@ -51,8 +51,7 @@ bool FloodRun::isFilled(std::size_t tile) const {
 // Writes the unsigned distances of a tile, then its border.
 void FloodRun::fill(std::size_t tile) const {
     const glm::ivec3 place = tiling_.place(tile);
-    const std::vector<TileTriangle> triangles =
-        readTileTriangles(folder_.triangles(place), plan_.loads()[tile].triangles);
+    const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), plan_.loads()[tile]);
     BuiltTile built = buildTile(triangles, plan_.facts(), tiling_, tile, options_, plan_.signs().signs);
     if (!built.grids) return writeBorder(folder_.border(place), emptyBorder(tiling_.own(tile)), "");
     openvdb::GridCPtrVec grids{withOrigin(built.grids->distance, plan_.facts().origin)};
@@ -144,8 +143,7 @@ FloodTile FloodRun::load(std::size_t tile, bool withTriangles) {
 
 WindingNumber FloodRun::trianglesOf(std::size_t tile) const {
     return WindingNumber(
-        meshOf(readTileTriangles(folder_.triangles(tiling_.place(tile)), plan_.loads()[tile].triangles),
-               plan_.facts().origin));
+        meshOf(readTileTriangles(folder_.triangles(tiling_.place(tile)), plan_.loads()[tile]), plan_.facts().origin));
 }
 
 // The tiles that touch a tile, at its edges and corners too.

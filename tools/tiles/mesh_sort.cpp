@@ -44,7 +44,7 @@ void MeshSort::run(const Json& identity, int round, const PlannedSigns* known) {
     const Json sorting{{"seconds", watch.seconds()}, {"peakRssBytes", peakMemory()}, {"streamed", facts.hash == 0}};
     Json signs;
     if (!hasOwnSigns(a_.options.method)) signs = toJson(known ? *known : PlannedSigns{mesh.signs, round});
-    writeJson(folder_.plan(), TilePlan::toJson(identity, facts, a_.options.voxelSize, signs, loads, sorting));
+    writeRecord(folder_.plan(), TilePlan::toJson(identity, facts, a_.options.voxelSize, signs, loads, sorting));
 }
 
 // Reads the mesh whole if it fits, since its hash is then known.

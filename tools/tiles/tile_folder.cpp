@@ -11,6 +11,7 @@
 
 #include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
+#include "sdf/tiles/hashed_record.h"
 
 namespace bilayer::tools {
 
@@ -67,8 +68,33 @@ Json readJson(const std::filesystem::path& path) {
     try {
         return Json::parse(stream);
     } catch (const Json::exception& error) {
-        throw std::runtime_error(fmt::format("{}: is no JSON ({})", path.string(), error.what()));
+        throw std::runtime_error(
+            fmt::format("{}: is damaged ({}): remove it, and repeat the command", path.string(), error.what()));
     }
+}
+
+void writeRecord(const std::filesystem::path& path, const Json& json) {
+    const std::string text = json.dump();
+    HashedRecordWriter record;
+    record.add(std::vector<char>(text.begin(), text.end()));
+    record.write(path);
+}
+
+Json readRecord(const std::filesystem::path& path) {
+    return Json::parse(HashedRecordReader(path).values<char>());
+}
+
+Json readPlanOfKilledRun(const TileFolder& folder) {
+    try {
+        return readRecord(folder.plan());
+    } catch (const std::runtime_error&) {
+        throw std::runtime_error(fmt::format("{}: is damaged: remove the folder {}, and repeat the command",
+                                             folder.plan().string(), folder.work().string()));
+    }
+}
+
+std::uint64_t recordBytes(const Json& json) {
+    return json.dump().size() + 2 * sizeof(std::uint64_t);  // with its length and its hash
 }
 
 bool isIntact(const TileFolder& folder, const Json& record) {
@@ -78,6 +104,16 @@ bool isIntact(const TileFolder& folder, const Json& record) {
         return std::filesystem::is_regular_file(path) && fileHash(path) == record.at(hash);
     };
     return intact("file", "hash") && intact("cells", "cellsHash");
+}
+
+bool isFinished(const TileFolder& folder, const glm::ivec3& tile) {
+    const std::filesystem::path record = folder.record(tile);
+    if (!std::filesystem::exists(record)) return false;
+    try {
+        return isIntact(folder, readRecord(record));
+    } catch (const std::runtime_error&) {
+        return false;  // it is damaged
+    }
 }
 
 }  // namespace bilayer::tools

@@ -26,7 +26,7 @@ class TileFolder {
     std::filesystem::path cells(const glm::ivec3& tile) const { return root_ / (nameOf(tile) + ".cells"); }
 
     /// What a build has planned: the mesh, the options and the tiles. It is there when all triangles are sorted.
-    std::filesystem::path plan() const { return work() / "plan.json"; }
+    std::filesystem::path plan() const { return work() / "all.plan"; }
     /// The triangles of a tile.
     std::filesystem::path triangles(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".triangles"); }
     /// The sums of a tile's columns.
@@ -43,7 +43,7 @@ class TileFolder {
     /// It is there if a growth of a flood has improved any tile in a round.
     std::filesystem::path improved(const std::string& growth, std::uint32_t round) const;
     /// What is known of a finished tile.
-    std::filesystem::path record(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".json"); }
+    std::filesystem::path record(const glm::ivec3& tile) const { return work() / (nameOf(tile) + ".record"); }
 
     /// Creates the folders that do not exist. Throws std::runtime_error that names the folder.
     void create() const;
@@ -57,9 +57,9 @@ class TileFolder {
     void clean() const;
 
     const std::filesystem::path& root() const { return root_; }
+    std::filesystem::path work() const { return root_ / "work"; }
 
   private:
-    std::filesystem::path work() const { return root_ / "work"; }
     void removeFromWork(std::initializer_list<const char*> endings) const;
     static std::string nameOf(const glm::ivec3& tile);
 
@@ -72,8 +72,23 @@ void writeJson(const std::filesystem::path& path, const Json& json);
 /// Throws std::runtime_error that names the file if it cannot be read or is no JSON.
 Json readJson(const std::filesystem::path& path);
 
+/// The same for a file in `work`, which has a hash of its bytes.
+void writeRecord(const std::filesystem::path& path, const Json& json);
+
+/// Throws std::runtime_error that names the file if it cannot be read or is damaged.
+Json readRecord(const std::filesystem::path& path);
+
+/// Returns the plan that a killed run has left. Throws std::runtime_error that says what to do if it is damaged.
+Json readPlanOfKilledRun(const TileFolder& folder);
+
+/// The size of the file that writeRecord() makes [bytes].
+std::uint64_t recordBytes(const Json& json);
+
 /// Returns whether the files of a tile are there with the bytes that its record states. A tile without leaves has no
 /// file.
 bool isIntact(const TileFolder& folder, const Json& record);
+
+/// Returns whether the record of a tile is there and intact, and the files that it states.
+bool isFinished(const TileFolder& folder, const glm::ivec3& tile);
 
 }  // namespace bilayer::tools

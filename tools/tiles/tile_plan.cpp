@@ -32,22 +32,17 @@ Json bandOf(const openvdb::FloatGrid& grid) {
     return {{"lower", corner(box.min())}, {"upper", corner(box.max())}};
 }
 
-// The bytes that writeJson() writes.
-std::uint64_t bytesOf(const Json& json) {
-    return json.dump(1).size() + 1;
-}
-
 // What each rank has read and written, and what other ranks wrote of that.
 Json loadOfRanks(const std::vector<Json>& records, const Json& plan, const Json& sorting, int count) {
     Json ranks = Json::array();
     for (int rank = 0; rank < count; ++rank) {
-        std::uint64_t tiles = 0, read = 0, written = 0, fromOthers = rank > 0 ? bytesOf(plan) : 0;
+        std::uint64_t tiles = 0, read = 0, written = 0, fromOthers = rank > 0 ? recordBytes(plan) : 0;
         std::uint64_t peak = rank > 0 ? 0 : sorting.at("peakRssBytes").get<std::uint64_t>();
         double seconds = 0;
         for (const Json& record : records) {
             const std::uint64_t triangles = record.at("readBytes"), sums = record.value("sumBytes", std::uint64_t(0));
             const bool own = record.at("rank") == rank;
-            if (rank == 0 && !own) fromOthers += bytesOf(record);
+            if (rank == 0 && !own) fromOthers += recordBytes(record);
             if (!own) continue;
             ++tiles;
             read += triangles + sums;
@@ -94,7 +89,8 @@ Json identityOf(const BuildArguments& a, const glm::ivec3& counts, const std::st
 Json TilePlan::toJson(const Json& identity, const MeshFacts& facts, float voxelSize, const Json& signs,
                       const std::vector<TileLoad>& loads, const Json& sorting) {
     Json tiles = Json::array();
-    for (const TileLoad& load : loads) tiles.push_back({{"triangles", load.triangles}, {"area", load.area}});
+    for (const TileLoad& load : loads)
+        tiles.push_back({{"triangles", load.triangles}, {"area", load.area}, {"hash", load.hash}});
     return {{"field", identity},
             {"voxelSize", number(voxelSize)},
             {"mesh",
@@ -118,7 +114,8 @@ TilePlan::TilePlan(Json plan) : plan_(std::move(plan)) {
         voxelSize_ = plan_.at("voxelSize").get<float>();
         signs_ = plannedSigns(plan_.at("signs"));
         for (const Json& load : plan_.at("loads"))
-            loads_.push_back({load.at("triangles").get<std::uint64_t>(), load.at("area").get<double>()});
+            loads_.push_back({load.at("triangles").get<std::uint64_t>(), load.at("area").get<double>(),
+                              load.at("hash").get<std::uint64_t>()});
     } catch (const Json::exception& error) {
         throw std::runtime_error(
             fmt::format("the plan of the tiles is damaged: remove the folder work ({})", error.what()));

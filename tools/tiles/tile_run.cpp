@@ -105,21 +105,41 @@ class TileRun {
     // and the records of exactly those tiles that are intact.
     void prepare() {
         identity_ = identityOf(a_, counts_, fileHash(a_.mesh));
-        for (const auto& path : {folder_.manifest(), folder_.plan()})
-            if (std::filesystem::exists(path) && readJson(path).at("field") != identity_)
-                throw std::runtime_error(
-                    fmt::format("{}: holds tiles of another mesh or with other options: choose another folder",
-                                a_.output.string()));
-        if (std::filesystem::exists(folder_.manifest()) && isFinished()) return;
-        if (!std::filesystem::exists(folder_.plan())) sort().run(identity_, 0);
-        const TilePlan plan(readJson(folder_.plan()));
-        const Tiling tiling = tilingOf(plan);
-        for (std::size_t tile = 0; tile < tiling.size(); ++tile) {
-            const std::filesystem::path record = folder_.record(tiling.place(tile));
-            if (std::filesystem::exists(record) && !isIntact(folder_, readJson(record)))
-                std::filesystem::remove(record);
+        if (std::filesystem::exists(folder_.manifest())) {
+            requireSame(readJson(folder_.manifest()));
+            if (isFinished()) return;
+        } else if (std::filesystem::exists(folder_.plan())) {
+            resume();
+        } else {
+            sort().run(identity_, 0);
         }
-        stateMemory(plan, tiling);
+        const TilePlan plan(readRecord(folder_.plan()));
+        stateMemory(plan, tilingOf(plan));
+    }
+
+    void requireSame(const Json& made) const {
+        if (made.at("field") != identity_)
+            throw std::runtime_error(fmt::format(
+                "{}: holds tiles of another mesh or with other options: choose another folder", a_.output.string()));
+    }
+
+    // Sorts the triangles again if some that are needed are damaged.
+    void resume() {
+        const Json made = readPlanOfKilledRun(folder_);
+        requireSame(made);
+        const TilePlan plan(made);
+        const Tiling tiling = tilingOf(plan);
+        bool isSorted = true;
+        for (std::size_t tile = 0; tile < tiling.size(); ++tile) {
+            const glm::ivec3 place = tiling.place(tile);
+            const bool isDone = tools::isFinished(folder_, place);
+            if (!isDone) std::filesystem::remove(folder_.record(place));
+            if (!isDone || plan.signs().needSums() || plan.signs().areByFlood())
+                isSorted = isSorted && hasTileTriangles(folder_.triangles(place), plan.loads()[tile]);
+        }
+        if (isSorted) return;
+        const PlannedSigns signs = plan.signs();
+        sort().run(identity_, signs.round, &signs);
     }
 
     // Also sets the options of the tiles.
@@ -139,14 +159,14 @@ class TileRun {
         const PlannedSigns signs = plannedSigns(manifest.at("signs"));
         folder_.create();
         for (const Json& record : records)
-            if (intact(record)) writeJson(folder_.record(placeOf(record)), record);
+            if (intact(record)) writeRecord(folder_.record(placeOf(record)), record);
         sort().run(identity_, signs.round, &signs);
         std::filesystem::remove(folder_.manifest());
         return false;
     }
 
     void buildMissing() {
-        const TilePlan plan(readJson(folder_.plan()));
+        const TilePlan plan(readRecord(folder_.plan()));
         const Tiling tiling = tilingOf(plan);
         const std::vector<std::size_t> own = ownTiles(plan, tiling);
         ColumnFiles sums(folder_, plan, tiling);
@@ -208,13 +228,13 @@ class TileRun {
     }
 
     BuiltTile built(const TilePlan& plan, const Tiling& tiling, std::size_t tile, ColumnFiles& sums) {
-        const std::uint64_t count = plan.loads()[tile].triangles;
         BuiltTile built;
-        if (count == 0) return built;
+        if (plan.loads()[tile].triangles == 0) return built;
         PartSigns signs = plan.signs().signs;
         std::optional<ColumnSums> below;
         if (plan.signs().needSums()) signs.below = &below.emplace(sums.below(tile));
-        const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(tiling.place(tile)), count);
+        const std::vector<TileTriangle> triangles =
+            readTileTriangles(folder_.triangles(tiling.place(tile)), plan.loads()[tile]);
         wrapped([&] { built = buildTile(triangles, plan.facts(), tiling, tile, options_, signs); });
         return built;
     }
@@ -237,7 +257,7 @@ class TileRun {
         record["rank"] = ranks_.rank;
         record["seconds"] = watch.seconds() + load.seconds;
         record["peakRssBytes"] = peakMemory();
-        writeJson(folder_.record(place), record);
+        writeRecord(folder_.record(place), record);
     }
 
     void writeTile(BuiltTile tile, const glm::ivec3& place, const glm::dvec3& origin, const BlockBox& own,
@@ -277,7 +297,7 @@ class TileRun {
         std::vector<Json> records;
         std::vector<SignCounts> counts;
         for (std::size_t tile = 0; tile < tiling.size(); ++tile) {
-            records.push_back(readJson(folder_.record(tiling.place(tile))));
+            records.push_back(readRecord(folder_.record(tiling.place(tile))));
             counts.push_back(signCounts(records.back().at("signs")));
         }
         if (plan.signs().signs.check == NormalsCheck::count)
@@ -296,14 +316,14 @@ class TileRun {
         const int round = plan.signs().round;
         if (conflict) {
             sort().run(identity_, round + 1);
-            const TilePlan next(readJson(folder_.plan()));
+            const TilePlan next(readRecord(folder_.plan()));
             if (next.signs().areByFlood()) stateMemory(next, tilingOf(next));  // which needs more than others
         } else {
             for (std::size_t tile = 0; tile < tiling.size(); ++tile) folder_.remove(tiling.place(tile));
-            writeJson(folder_.plan(), plan.with({corrected(plan.signs().signs, sum), round}));
+            writeRecord(folder_.plan(), plan.with({corrected(plan.signs().signs, sum), round}));
         }
         if (a_.json) return;
-        const std::string reason = TilePlan(readJson(folder_.plan())).signs().signs.reason;
+        const std::string reason = TilePlan(readRecord(folder_.plan())).signs().signs.reason;
         fmt::print("all tiles again: {}\n", reason);
         std::fflush(stdout);
     }
