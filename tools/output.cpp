@@ -16,6 +16,7 @@
 
 #include "sdf/base/method_names.h"
 #include "sdf/io/atomic_file.h"
+#include "sdf/io/child_process.h"
 
 namespace bilayer::tools {
 
@@ -322,7 +323,7 @@ void writeText(const std::filesystem::path& path, const std::string& text) {
 std::uint64_t peakMemory() {
     rusage usage = {};
     ::getrusage(RUSAGE_SELF, &usage);
-    return std::uint64_t(usage.ru_maxrss) * 1024;
+    return std::max(std::uint64_t(usage.ru_maxrss) * 1024, detail::ChildProcess::peakMemory());
 }
 
 }  // namespace bilayer::tools

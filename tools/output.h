@@ -111,7 +111,7 @@ void requireWritable(const std::filesystem::path& path);
 /// Writes a file whole or not at all. Throws std::runtime_error that names the file.
 void writeText(const std::filesystem::path& path, const std::string& text);
 
-/// Returns the peak memory of the process [bytes].
+/// Returns the peak resident memory of this process or of the importers that it ran, whichever is larger [bytes].
 std::uint64_t peakMemory();
 
 }  // namespace bilayer::tools

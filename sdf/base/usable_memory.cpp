@@ -19,9 +19,9 @@ double physicalMemory() {
     return double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE));
 }
 
-double addressSpaceLimit() {
+double limitOf(decltype(RLIMIT_AS) resource) {
     rlimit limit{};
-    if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return unlimited;
+    if (::getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return unlimited;
     return double(limit.rlim_cur);
 }
 
@@ -59,7 +59,15 @@ double controlGroupLimit() {
 
 double usableMemory() {
     static const double ofMachine = std::min(physicalMemory(), controlGroupLimit());
-    return std::min(ofMachine, addressSpaceLimit());
+    return std::min(ofMachine, limitOf(RLIMIT_AS));
+}
+
+double remainingMemory() {
+    std::ifstream file("/proc/self/statm");
+    double addressSpace = 0, resident, shared, text, libraries, data = 0;  // [pages]
+    file >> addressSpace >> resident >> shared >> text >> libraries >> data;
+    const auto page = double(::sysconf(_SC_PAGESIZE));
+    return std::max(std::min(limitOf(RLIMIT_AS) - page * addressSpace, limitOf(RLIMIT_DATA) - page * data), 0.0);
 }
 
 }  // namespace bilayer::detail

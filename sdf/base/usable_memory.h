@@ -9,4 +9,8 @@ namespace bilayer::detail {
 /// groups, as containers set them [bytes]. They are read at the first call.
 double usableMemory();
 
+/// Returns how much more memory this process may take by its own limits of address space and data (`ulimit -v`, `-d`)
+/// [bytes]; infinite without limits.
+double remainingMemory();
+
 }  // namespace bilayer::detail

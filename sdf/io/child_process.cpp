@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <climits>
 #include <cstdlib>
@@ -24,10 +25,11 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr int answerPipe = 3;          // file descriptor in the child: the first after the standard streams
-constexpr int pipeCapacity = 1 << 20;  // [bytes]: needs fewer context switches than the usual 64 kB
-constexpr int diedBeforeAnswer = 127;  // exit status
-constexpr char startMark = 's';        // the child's first byte
+constexpr int answerPipe = 3;                 // file descriptor in the child: the first after the standard streams
+constexpr int pipeCapacity = 1 << 20;         // [bytes]: needs fewer context switches than the usual 64 kB
+constexpr int diedBeforeAnswer = 127;         // exit status
+constexpr char startMark = 's';               // the child's first byte
+std::atomic<std::uint64_t> childrenPeak = 0;  // [bytes]
 constexpr std::chrono::milliseconds firstStartTime{20}, maxStartTime{10000};
 
 // Blocks signals until the child has removed the caller's handlers.
@@ -167,12 +169,30 @@ void ChildProcess::end() noexcept {
     pipe_ = -1;
     if (process_ <= 0) return;
     // Until the child is reaped, here or by the caller's own handler, its process id stays valid.
-    if (::waitpid(process_, nullptr, WNOHANG) == 0) {
+    if (reap(nullptr, WNOHANG) == 0) {
         ::kill(process_, SIGKILL);
-        while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {
-        }
+        reap(nullptr, 0);
     }
     process_ = -1;
+}
+
+pid_t ChildProcess::reap(int* status, int options) noexcept {
+    rusage usage{};
+    pid_t ended = 0;
+    while ((ended = ::wait4(process_, status, options, &usage)) < 0 && errno == EINTR) {
+    }
+    const auto peak = std::uint64_t(usage.ru_maxrss) * 1024;
+    for (std::uint64_t known = childrenPeak; peak > known && !childrenPeak.compare_exchange_weak(known, peak);) {
+    }
+    return ended;
+}
+
+std::uint64_t ChildProcess::peakMemory() {
+    return childrenPeak;
+}
+
+void ChildProcess::resetPeakMemory() {
+    childrenPeak = 0;
 }
 
 void ChildProcess::receive(void* bytes, std::size_t count) {
@@ -208,9 +228,7 @@ void ChildProcess::waitForBytes() {
 
 void ChildProcess::throwEnd() {
     int status = 0;
-    pid_t ended = 0;
-    while ((ended = ::waitpid(process_, &status, 0)) < 0 && errno == EINTR) {
-    }
+    const pid_t ended = reap(&status, 0);
     process_ = -1;
     if (ended > 0 && WIFSIGNALED(status))
         throw ChildFailure(fmt::format("ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status))));

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <stdexcept>
 
@@ -38,6 +39,10 @@ class ChildFailure : public std::runtime_error {
 /// ignores SIGCHLD or reaps all children itself, error texts lack the signal number; nothing else changes.
 class ChildProcess {
   public:
+    /// The maximum peak of resident memory of the children that have ended since the last reset [bytes].
+    static std::uint64_t peakMemory();
+    static void resetPeakMemory();
+
     /// Sends bytes to the caller.
     using Send = std::function<void(const void* bytes, std::size_t count)>;
     /// An exception from this function ends the child without an answer.
@@ -57,6 +62,7 @@ class ChildProcess {
     void start(std::chrono::milliseconds startTime, std::size_t addressLimit, const Work& work);
     bool hasStarted();
     void end() noexcept;
+    pid_t reap(int* status, int options) noexcept;
     std::size_t receiveSome(char* bytes, std::size_t count);  // 0: the child closed the pipe
     void waitForBytes();
     [[noreturn]] void throwEnd();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <new>
 #include <numeric>
 
 namespace bilayer::detail {
@@ -11,8 +12,10 @@ namespace {
 constexpr std::uint64_t maxNotes = 1000;       // further notes on a file are not sent
 constexpr std::uint64_t maxTextBytes = 10000;  // of a note, of an error
 
+enum Answer : std::uint64_t { ofPolygons, ofError, ofExhaustedMemory };
+
 struct RecordHeader {
-    std::uint64_t isError, points, corners, sizes, notes;
+    std::uint64_t answer, points, corners, sizes, notes;
 };
 
 void sendText(const ChildProcess::Send& send, const std::string& text) {
@@ -53,7 +56,7 @@ bool consistent(const Polygons& p) {
 }  // namespace
 
 void sendPolygons(const ChildProcess::Send& send, const Polygons& p) {
-    const RecordHeader header{0, p.points.size(), p.corners.size(), p.sizes.size(),
+    const RecordHeader header{ofPolygons, p.points.size(), p.corners.size(), p.sizes.size(),
                               std::min<std::uint64_t>(p.notes.size(), maxNotes)};
     send(&header, sizeof header);
     send(p.points.data(), p.points.size() * sizeof(glm::dvec3));
@@ -63,16 +66,22 @@ void sendPolygons(const ChildProcess::Send& send, const Polygons& p) {
 }
 
 void sendError(const ChildProcess::Send& send, const std::string& text) {
-    const RecordHeader header{1, 0, 0, 0, 0};
+    const RecordHeader header{ofError, 0, 0, 0, 0};
     send(&header, sizeof header);
     sendText(send, text);
+}
+
+void sendOutOfMemory(const ChildProcess::Send& send) {
+    const RecordHeader header{ofExhaustedMemory, 0, 0, 0, 0};
+    send(&header, sizeof header);
 }
 
 Polygons receivePolygons(ChildProcess& child, std::size_t byteLimit) {
     RecordHeader header{};
     child.receive(&header, sizeof header);
-    if (header.isError == 1) throw std::runtime_error(receiveText(child));
-    if (header.isError != 0 || !fits(header, byteLimit)) throw ChildFailure("gave a damaged answer");
+    if (header.answer == ofError) throw std::runtime_error(receiveText(child));
+    if (header.answer == ofExhaustedMemory) throw std::bad_alloc();
+    if (header.answer != ofPolygons || !fits(header, byteLimit)) throw ChildFailure("gave a damaged answer");
     Polygons polygons;
     receiveAll(child, polygons.points, header.points);
     receiveAll(child, polygons.corners, header.corners);

@@ -10,12 +10,14 @@
 
 namespace bilayer::detail {
 
-/// Sends polygons, or an error text instead.
+/// Sends polygons; or instead an error text, or that memory is exhausted.
 void sendPolygons(const ChildProcess::Send& send, const Polygons& polygons);
 void sendError(const ChildProcess::Send& send, const std::string& text);
+void sendOutOfMemory(const ChildProcess::Send& send);
 
 /// Receives polygons without trusting the data. Throws ChildFailure if the counts exceed `byteLimit` or are
-/// inconsistent, or if a corner refers to no point. Throws std::runtime_error with the error text if one was sent.
+/// inconsistent, or if a corner refers to no point. Throws std::runtime_error with the error text if one was sent,
+/// and std::bad_alloc if memory was exhausted.
 Polygons receivePolygons(ChildProcess& child, std::size_t byteLimit);
 
 }  // namespace bilayer::detail

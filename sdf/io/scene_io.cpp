@@ -5,10 +5,12 @@
 
 #include <cctype>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "sdf/base/quoted_text.h"
+#include "sdf/base/usable_memory.h"
 #include "sdf/io/assimp_reader.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/polygon_record.h"
@@ -34,8 +36,12 @@ bool isGltf(const std::string& format) {
     return format == "GLTF" || format == "GLB";
 }
 
-void readInChild(const std::filesystem::path& path, std::size_t memory, const ChildProcess::Send& send) {
+// Reads and sends the scene.
+// @param remaining  memory that this process may take, less than importers get; or nothing
+void readInChild(const std::filesystem::path& path, std::size_t memory, std::optional<double> remaining,
+                 const ChildProcess::Send& send) {
     const auto tooLarge = [&] {
+        if (remaining) return sendOutOfMemory(send);
         sendError(send,
                   fmt::format("reading it needs more than the {} MiB of memory that importers get; it may be damaged",
                               memory >> 20));
@@ -56,6 +62,12 @@ void readInChild(const std::filesystem::path& path, std::size_t memory, const Ch
     sendPolygons(send, polygons);
 }
 
+// Importers that get no memory may go on without it, and then find something else to complain about, or nothing.
+std::string memoryNote(double remaining) {
+    return fmt::format("its importer may need more than the {:.0f} MiB of memory that this process may still take",
+                       remaining / (1 << 20));
+}
+
 }  // namespace
 
 ChildLimits sceneLimits(std::size_t fileSize) {
@@ -65,17 +77,23 @@ ChildLimits sceneLimits(std::size_t fileSize) {
 Polygons readScene(const std::filesystem::path& path, const ChildLimits& limits) {
     requireInputFile(path);
     const std::string format = formatOf(path);
+    std::optional<double> remaining = remainingMemory();
+    if (*remaining >= double(limits.memory)) remaining.reset();
+    const std::string otherReason = remaining ? "; " + memoryNote(*remaining) : "";
     try {
-        ChildProcess child(limits, [&](const ChildProcess::Send& send) { readInChild(path, limits.memory, send); });
-        return receivePolygons(child, limits.memory);
+        ChildProcess child(limits,
+                           [&](const ChildProcess::Send& send) { readInChild(path, limits.memory, remaining, send); });
+        Polygons polygons = receivePolygons(child, limits.memory);
+        if (remaining && polygons.corners.empty()) polygons.notes.push_back(memoryNote(*remaining));
+        return polygons;
     } catch (const ChildFailure& failure) {
-        throw std::runtime_error(fmt::format("{}: the importer for {} files {}; convert it to {}", path.string(),
-                                             format, failure.what(),
-                                             isGltf(format) ? "OBJ, PLY or STL" : "OBJ, PLY, STL or glTF"));
+        throw std::runtime_error(
+            fmt::format("{}: the importer for {} files {}; convert it to {}{}", path.string(), format, failure.what(),
+                        isGltf(format) ? "OBJ, PLY or STL" : "OBJ, PLY, STL or glTF", otherReason));
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {
-        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
+        throw std::runtime_error(fmt::format("{}: {}{}", path.string(), error.what(), otherReason));
     }
 }
 

@@ -28,8 +28,9 @@
 namespace bilayer::detail {
 namespace {
 
-/// Triangles that are visited at once. Pages of a file are released after each batch.
-constexpr std::size_t batchTriangles = 1 << 16;
+/// Triangles that are visited at once. Pages of a file are released after each batch: at most 96 MiB, where each corner
+/// lies on a page of its own.
+constexpr std::size_t batchTriangles = 1 << 13;
 
 // 0 and -0 are equal, as when a mesh is welded.
 bool isCollapsed(const glm::vec3* corners) {

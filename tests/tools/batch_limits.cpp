@@ -4,12 +4,14 @@
 
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <fstream>
 #include <iterator>
 #include <thread>
 
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/support.h"
 #include "tests/tools/library.h"
 #include "tests/tools/program.h"
@@ -84,6 +86,27 @@ TEST_CASE("a mesh that needs too much memory is ended alone") {
     CHECK(record["reason"] == "memory limit");
     CHECK(record["error"].get<std::string>().find("128 MiB") != std::string::npos);
     CHECK(record["peakBytes"].get<double>() < 400e6);
+}
+
+TEST_CASE("an importer that lacks memory does not call a file empty or damaged") {
+    const fs::path library = emptyFolder("importer"), output = emptyFolder("importer_fields");
+    for (const SceneFile& file : cubeFiles()) std::ofstream(library / file.name, std::ios::binary) << file.bytes;
+    std::size_t done = 0, failed = 0;
+    for (int limit = 10; limit <= 100; limit += 10) {
+        const Result r = run(batchWords(library, output, {"--memory-limit", std::to_string(limit)}));
+        for (const auto& [name, record] : recordsIn(r.out)) {
+            INFO(record.dump());
+            if (record["outcome"] != "failed") {
+                ++done;
+                continue;
+            }
+            ++failed;
+            const std::string error = record["error"];
+            CHECK((record["reason"] == "memory limit" || error.find("may need more than") != std::string::npos));
+        }
+    }
+    CHECK(done > 0);
+    CHECK(failed > 0);
 }
 
 TEST_CASE("a crash ends one mesh alone") {

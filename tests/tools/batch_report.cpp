@@ -92,6 +92,20 @@ TEST_CASE("a thumbnail shows the mesh") {
     CHECK(png.size() < 8000);
 }
 
+TEST_CASE("meshes whose names are no UTF-8 have their own records and thumbnails") {
+    const fs::path library = emptyFolder("names"), output = emptyFolder("name_fields");
+    for (const char* name : {"a\xff.ply", "a\xfe.ply", "\xc3\xa4.ply"})
+        writeMesh(library / name, shapes::box({1, 1, 1}));
+    const auto records = recordsIn(run(batchWords(library, output)).out);
+    CHECK(records.size() == 3);
+    CHECK(records.count("a\\xff.ply") == 1);
+    CHECK(records.count("a\\xfe.ply") == 1);
+    CHECK(records.count("\xc3\xa4.ply") == 1);
+    const auto json = run({"batch", "--report", output.string(), "--json"}).json();
+    CHECK(json["done"] == 3);
+    CHECK(countOf(contents(output / "report.html"), "src=\"data:image/png;base64,") == 3);
+}
+
 TEST_CASE("damaged records are counted, and missing ones are an error") {
     const fs::path library = boxLibrary("library", 3), output = emptyFolder("damaged");
     REQUIRE(run(batchWords(library, output)).status == 0);

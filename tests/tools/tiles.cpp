@@ -112,6 +112,23 @@ TEST_CASE("a build that was killed continues with the missing tiles") {
     CHECK(sameFields(merged(folder), inOnePiece(mesh, {"--resolution", "300", "--sign", "normals"})));
 }
 
+TEST_CASE("one process at a time builds the tiles of a folder") {
+    const fs::path mesh = largeMeshFile("alone.ply"), folder = scratch("alone");
+    const Words words = withNormals(mesh, folder, "4x4x2", {"--resolution", "300", "--threads", "1"});
+    const pid_t process = start(words);
+    for (int i = 0; i < 2000 && !fs::exists(folder / "work"); ++i) ::usleep(5000);
+    checkRefusal(words, 1, "another process builds these tiles");
+    CHECK(wait(process) == 0);
+    CHECK(sameFields(merged(folder), inOnePiece(mesh, {"--resolution", "300", "--sign", "normals"})));
+}
+
+TEST_CASE("tiles whose records would not fit are refused") {
+    const fs::path mesh = scratch("box.ply"), folder = scratch("too many tiles");
+    writeMesh(mesh, shapes::box({1, 1, 1}));
+    checkRefusal(withNormals(mesh, folder, "40x40x40", {"--resolution", "1300", "--memory", "200"}), 1,
+                 "the records of 64000 tiles need about");
+}
+
 TEST_CASE("a tile with a wrong byte is found and built again") {
     const fs::path mesh = largeMeshFile("byte.ply"), folder = scratch("byte");
     const Words words = withNormals(mesh, folder, "2x2x1", {"--resolution", "100"});

@@ -44,14 +44,23 @@ std::vector<fs::path> linesOf(std::istream& stream) {
 
 }  // namespace
 
-std::vector<BatchMesh> meshesInTree(const fs::path& folder) try {
+std::vector<BatchMesh> meshesInTree(const fs::path& folder) {
     std::vector<BatchMesh> meshes;
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
-        if (isMesh(entry)) meshes.push_back({entry.path(), entry.path().lexically_relative(folder).generic_string()});
+    // an iterator over all levels does not tell which folder it cannot read
+    std::vector<fs::path> folders{folder};
+    while (!folders.empty()) {
+        const fs::path current = std::move(folders.back());
+        folders.pop_back();
+        std::error_code error;
+        for (fs::directory_iterator entry(current, error), end; !error && entry != end; entry.increment(error)) {
+            if (entry->is_directory(error) && !entry->is_symlink(error))
+                folders.push_back(entry->path());
+            else if (isMesh(*entry))
+                meshes.push_back({entry->path(), entry->path().lexically_relative(folder).generic_string()});
+        }
+        if (error) throw std::runtime_error(fmt::format("{}: {}", current.string(), error.message()));
+    }
     return meshes;
-} catch (const fs::filesystem_error& error) {
-    const fs::path& at = error.path1().empty() ? folder : error.path1();
-    throw std::runtime_error(fmt::format("{}: {}", at.string(), error.code().message()));
 }
 
 std::vector<fs::path> pathsInList(const fs::path& list) {

@@ -3,7 +3,7 @@
 
 #include <zlib.h>
 
-#include <stdexcept>
+#include <new>
 #include <string_view>
 
 namespace bilayer::tools {
@@ -27,7 +27,7 @@ std::string compressed(std::string_view bytes) {
     std::string result(size, '\0');
     if (compress2(reinterpret_cast<Bytef*>(result.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
                   uLong(bytes.size()), Z_DEFAULT_COMPRESSION) != Z_OK)
-        throw std::runtime_error("a picture cannot be compressed");
+        throw std::bad_alloc();  // there is room for the result
     result.resize(size);
     return result;
 }

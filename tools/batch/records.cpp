@@ -12,6 +12,7 @@
 #include <fstream>
 #include <map>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 
 namespace bilayer::tools {
@@ -69,9 +70,29 @@ RecordFile::~RecordFile() {
 
 void RecordFile::add(const std::string& line) {
     if (file_ < 0) file_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-    if (file_ < 0 || ::write(file_, line.data(), line.size()) != ssize_t(line.size()))
-        throw std::runtime_error(
-            fmt::format("cannot write {}: {}", path_.string(), std::generic_category().message(errno)));
+    for (std::string_view rest = line; !rest.empty();) {
+        // a full disk may take a part of the line first
+        const ssize_t written = file_ < 0 ? -1 : ::write(file_, rest.data(), rest.size());
+        if (written < 0 && file_ >= 0 && errno == EINTR) continue;
+        if (written < 0)
+            throw std::runtime_error(
+                fmt::format("cannot write {}: {}", path_.string(), std::generic_category().message(errno)));
+        rest.remove_prefix(std::size_t(written));
+    }
+}
+
+std::string textOf(const std::string& name) {
+    try {
+        (void)Json(name).dump();
+        return name;
+    } catch (const Json::exception&) {
+    }
+    std::string text;
+    for (const char byte : name) {
+        const auto value = static_cast<unsigned char>(byte);
+        text += value < 0x80 ? std::string(1, byte) : fmt::format("\\x{:02x}", value);
+    }
+    return text;
 }
 
 std::string lineOf(const Json& record) {

@@ -31,6 +31,9 @@ class RecordFile {
     int file_ = -1;
 };
 
+/// Returns the name or path of a file as a record has it: as it is, or if it is no UTF-8 with other bytes as "\xff".
+std::string textOf(const std::string& name);
+
 /// Returns a record as a line.
 std::string lineOf(const Json& record);
 

@@ -166,30 +166,35 @@ class Scheduler {
             const bool hasEnded = ready_[i] && !worker.read();
             if (!hasEnded && worker.millisecondsLeft() != 0) continue;
             const WorkerEnd end = worker.finish();
-            if (hasEnded && end.answer.empty() && worker.isUsed()) {
+            Json known = Json::parse(end.answer, nullptr, /*allow_exceptions=*/false);
+            if (!known.is_object()) known = {{"outcome", "failed"}, {"reason", end.reason}, {"error", end.error}};
+            if (worker.isUsed() && mayBeOfOthers(end, known)) {
                 tryAlone(*running_[i]);
                 continue;
             }
-            settle(*running_[i], end);
+            settle(*running_[i], end, std::move(known));
             if (!end.answer.empty() && end.peakMemory <= maxReusedMemory)
                 idle_.push_back(std::move(running_[i]->place));
             running_.erase(running_.begin() + std::ptrdiff_t(i));
         }
     }
 
-    // What meshes before this one have left in the process may be why it failed: a new process decides.
+    // Whether what meshes before this one have left in the process may be why it failed: a new process decides.
+    bool mayBeOfOthers(const WorkerEnd& end, const Json& known) const {
+        if (end.answer.empty()) return end.reason != "time limit";
+        return known["outcome"] == "failed" && plan_.limits.memory > 0;
+    }
+
     void tryAlone(RunningMesh& running) {
         running.place = newWorkplace();
         running.place->worker.begin(running.task);
     }
 
-    void settle(const RunningMesh& running, const WorkerEnd& end) {
+    void settle(const RunningMesh& running, const WorkerEnd& end, Json known) {
         const BatchMesh& mesh = *running.mesh;
-        Json known = Json::parse(end.answer, nullptr, /*allow_exceptions=*/false);
-        if (!known.is_object()) known = {{"outcome", "failed"}, {"reason", end.reason}, {"error", end.error}};
         const fs::path& work = running.place->folder.path();
         std::error_code error;
-        fs::rename(work / workThumbnail, plan_.folder.thumbnail(mesh.name), error);
+        fs::rename(work / workThumbnail, plan_.folder.thumbnail(textOf(mesh.name)), error);
         if (error) fs::remove(work / workThumbnail, error);  // the next mesh may have none
         if (known["outcome"] == "done")
             if (const std::string error = moveTo(work / workField, plan_.folder.field(mesh.name)); !error.empty())
@@ -212,9 +217,9 @@ class Scheduler {
 
     void record(const RunningMesh& running, const WorkerEnd& end, const Json& known) {
         Json record{{"time", timeText()},
-                    {"file", running.mesh->name},
-                    {"path", running.mesh->file.string()},
-                    {"output", plan_.folder.field(running.mesh->name).string()},
+                    {"file", textOf(running.mesh->name)},
+                    {"path", textOf(running.mesh->file.string())},
+                    {"output", textOf(plan_.folder.field(running.mesh->name).string())},
                     {"shard", plan_.shard.text()},
                     {"options", plan_.conversion.optionsText},
                     {"optionsHash", optionsHash_},

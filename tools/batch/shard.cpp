@@ -51,7 +51,10 @@ Shard parseShard(const std::string& text, const std::string& option) {
 std::optional<Shard> slurmShard() {
     const auto id = variable("SLURM_ARRAY_TASK_ID"), count = variable("SLURM_ARRAY_TASK_COUNT"),
                min = variable("SLURM_ARRAY_TASK_MIN"), max = variable("SLURM_ARRAY_TASK_MAX");
-    if (!id || !count || !min || !max) return std::nullopt;
+    if (!id) return std::nullopt;
+    if (!count || !min || !max)
+        throw CLI::ValidationError("SLURM_ARRAY_TASK_ID",
+                                   "is set, but SLURM_ARRAY_TASK_COUNT, _MIN or _MAX is not: give --shard");
     const std::uint32_t gaps = *count - 1, range = *max - *min;
     const bool isEven = *count >= 1 && *id >= *min && *id <= *max && (gaps == 0 ? range == 0 : range % gaps == 0) &&
                         (range == 0 || (*id - *min) % (range / gaps) == 0);

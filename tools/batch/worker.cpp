@@ -21,6 +21,7 @@
 #include <new>
 #include <system_error>
 
+#include "sdf/io/child_process.h"
 #include "tools/output.h"
 
 namespace bilayer::tools {
@@ -58,6 +59,7 @@ void send(int socket, std::string_view text) {
 
 // Makes the peak of resident memory that of the next task, where the kernel allows it.
 void resetPeakMemory() {
+    detail::ChildProcess::resetPeakMemory();
     const int file = ::open("/proc/self/clear_refs", O_WRONLY | O_CLOEXEC);
     if (file < 0) return;
     [[maybe_unused]] const ssize_t written = ::write(file, "5", 1);

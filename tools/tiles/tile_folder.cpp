@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tools/tiles/tile_folder.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <stdexcept>
 #include <system_error>
@@ -56,6 +60,17 @@ void TileFolder::remove(const glm::ivec3& tile) const {
 void TileFolder::clean() const {
     std::error_code ignored;
     std::filesystem::remove_all(work(), ignored);
+}
+
+FolderLock::FolderLock(const std::filesystem::path& folder)
+    : file_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    if (file_ < 0 || ::flock(file_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+    ::close(file_);
+    throw std::runtime_error(folder.string() + ": another process builds these tiles: wait until it has ended");
+}
+
+FolderLock::~FolderLock() {
+    if (file_ >= 0) ::close(file_);
 }
 
 void writeJson(const std::filesystem::path& path, const Json& json) {

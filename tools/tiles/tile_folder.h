@@ -66,6 +66,20 @@ class TileFolder {
     std::filesystem::path root_;
 };
 
+/// The lock of a folder, which ends with this object and with the process. Some network file systems have no locks for
+/// folders; nothing is locked there.
+class FolderLock {
+  public:
+    /// Throws std::runtime_error that names the folder if another process has its lock.
+    explicit FolderLock(const std::filesystem::path& folder);
+    ~FolderLock();
+    FolderLock(const FolderLock&) = delete;
+    FolderLock& operator=(const FolderLock&) = delete;
+
+  private:
+    int file_;
+};
+
 /// Writes a file whole or not at all. Throws std::runtime_error that names the file.
 void writeJson(const std::filesystem::path& path, const Json& json);
 

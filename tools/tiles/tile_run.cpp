@@ -33,6 +33,8 @@ using namespace bilayer::detail;
 namespace {
 
 constexpr double mib = 1 << 20;
+/// Memory of a process that joins the records of tiles [bytes], and per tile: 82,000 tiles took 440 MB in all.
+constexpr double bytesOfJoin = 90e6, bytesPerRecord = 4300;
 
 // Throws for options whose results need the whole field.
 void requireTileOptions(const BuildArguments& a) {
@@ -88,7 +90,7 @@ class TileRun {
           folder_(a_.output) {}
 
     void run() {
-        if (ranks_.isFirst()) prepare();
+        if (ranks_.isFirst()) prepareAlone();
         ranks_.wait();
         while (!std::filesystem::exists(folder_.manifest())) {
             ranks_.wait();  // else a fast first rank would write the manifest here
@@ -101,6 +103,19 @@ class TileRun {
     }
 
   private:
+    // No other build may write the folder. A new folder goes if there is nothing to build.
+    void prepareAlone() {
+        const bool isNew = std::filesystem::create_directories(folder_.root());
+        lock_.emplace(folder_.root());
+        try {
+            prepare();
+        } catch (...) {
+            std::error_code notEmpty;
+            if (isNew) std::filesystem::remove(folder_.root(), notEmpty);
+            throw;
+        }
+    }
+
     // Plans the field, or resumes the existing plan. Afterwards there is the manifest of a finished field, or a plan
     // and the records of exactly those tiles that are intact.
     void prepare() {
@@ -200,8 +215,13 @@ class TileRun {
             throw std::runtime_error(
                 fmt::format("the largest of {} tiles needs about {:.0f} MiB, and {:.0f} MiB are given: take more tiles",
                             tiling.size(), largest / mib, budget_ / mib));
+        const double join = bytesOfJoin + double(tiling.size()) * bytesPerRecord;
+        if (join > budget_)
+            throw std::runtime_error(fmt::format(
+                "the records of {} tiles need about {:.0f} MiB, and {:.0f} MiB are given: take fewer, larger tiles",
+                tiling.size(), join / mib, budget_ / mib));
         if (a_.json) return;
-        fmt::print("each of {} tiles within {:.0f} MiB\n", tiling.size(), largest / mib);
+        fmt::print("each of {} tiles within {:.0f} MiB\n", tiling.size(), std::max(largest, join) / mib);
         std::fflush(stdout);
     }
 
@@ -334,7 +354,8 @@ class TileRun {
     double budget_;  // [bytes]
     const Ranks& ranks_;
     TileFolder folder_;
-    Json identity_;  // of the first rank
+    std::optional<FolderLock> lock_;  // of the first rank
+    Json identity_;                   // of the first rank
 };
 
 }  // namespace
