@@ -31,10 +31,13 @@ openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const Le
 void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
     AtomicFile file(path);
     try {
-        const std::string bytes = archiveOf(grids);
         std::ofstream stream(file.temporary(), std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);
-        stream << bytes << checksumLine(bytes);
+        ChecksumBuffer buffer(*stream.rdbuf());
+        std::ostream archive(&buffer);
+        archive.exceptions(std::ios::failbit | std::ios::badbit);
+        writeArchive(archive, grids);
+        stream << buffer.line();
         stream.close();
     } catch (const std::bad_alloc&) {
         throw;

@@ -15,15 +15,12 @@
 #include <utility>
 #include <vector>
 
-#include "sdf/base/large_array.h"
 #include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t taskLeaves = 256;          // leaves that one task compresses
-constexpr std::size_t bytesPerTopologyByte = 4;  // of the leaves, for each of masks and tiles; approximate
-constexpr std::size_t metadataBytes = 1 << 20;   // estimated size of the rest of a file
+constexpr std::size_t taskLeaves = 256;  // leaves that one task compresses
 
 /// Writes grids with complete metadata. Does not handle grids that share a name or a tree. OpenVDB's own archives would
 /// compress all leaves a second time, to find the sizes for delayed loading.
@@ -89,12 +86,6 @@ class CompressedGrid : public Grid {
         if (!sizes.empty()) this->insertMeta(GridBase::META_FILE_DELAYED_LOAD, sizes);
     }
 
-    std::size_t bytes() const {
-        std::size_t sum = 0;
-        for (const std::string& part : parts_) sum += part.size();
-        return sum;
-    }
-
     /// Call only once: memory is freed as it is written.
     void writeBuffers(std::ostream& out) const override {
         for (std::string& part : parts_) {
@@ -145,25 +136,15 @@ class PreparedGrids {
                 add(openvdb::ConstPtrCast<openvdb::GridBase>(grid)->copyGrid());
     }
 
-    /// Returns the bytes of the archive.
-    std::string bytes() const {
-        std::string room;
-        room.reserve(bytes_);
-        adviseHugePages(room.data(), bytes_);
-        std::ostringstream memory(std::move(room));
-        memory.exceptions(std::ios::failbit | std::ios::badbit);
-        FieldArchive().writeTo(memory, grids_);
-        return std::move(memory).str();
-    }
+    /// Call only once: memory is freed as it is written.
+    void write(std::ostream& out) const { FieldArchive().writeTo(out, grids_); }
 
   private:
     template <class Grid>
     bool add(const openvdb::GridBase::ConstPtr& grid) {
         const auto typed = openvdb::gridPtrCast<Grid>(openvdb::ConstPtrCast<openvdb::GridBase>(grid));
         if (!typed) return false;
-        const auto compressed = std::make_shared<CompressedGrid<Grid>>(*typed);
-        bytes_ += compressed->bytes() + compressed->bytes() / bytesPerTopologyByte;
-        add(compressed);
+        add(std::make_shared<CompressedGrid<Grid>>(*typed));
         return true;
     }
 
@@ -175,13 +156,12 @@ class PreparedGrids {
     }
 
     openvdb::GridCPtrVec grids_;
-    std::size_t bytes_ = metadataBytes;  // estimated file size
 };
 
 }  // namespace
 
-std::string archiveOf(const openvdb::GridCPtrVec& grids) {
-    return PreparedGrids(grids).bytes();
+void writeArchive(std::ostream& out, const openvdb::GridCPtrVec& grids) {
+    PreparedGrids(grids).write(out);
 }
 
 }  // namespace bilayer::detail

@@ -18,6 +18,11 @@ constexpr std::size_t lineSize = lineStart.size() + 9;  // eight digits and a li
 // A truncated file ends with a prefix of the checksum line. A prefix of at least this length is no coincidence; a file
 // that ends with a shorter one still has all of its grids.
 constexpr std::size_t minPrefix = 4;
+constexpr std::size_t waitingBytes = 1 << 18;
+
+std::string lineOf(uLong sum) {
+    return fmt::format("{}{:08x}\n", lineStart, sum);
+}
 
 }  // namespace
 
@@ -37,7 +42,30 @@ std::string checksumLine(std::string_view bytes) {
         return Sum{crc32_combine(a.value, b.value, z_off_t(b.size)), a.size + b.size};
     };
     const Sum sum = tbb::parallel_reduce(tbb::blocked_range<std::size_t>(0, bytes.size(), grain), Sum{}, add, join);
-    return fmt::format("{}{:08x}\n", lineStart, sum.value);
+    return lineOf(sum.value);
+}
+
+ChecksumBuffer::ChecksumBuffer(std::streambuf& to) : to_(to), waiting_(waitingBytes), sum_(crc32(0, nullptr, 0)) {
+    setp(waiting_.data(), waiting_.data() + waiting_.size());
+}
+
+int ChecksumBuffer::sync() {
+    const std::streamsize count = pptr() - pbase();
+    sum_ = crc32_z(sum_, reinterpret_cast<const Bytef*>(pbase()), z_size_t(count));
+    const bool isWritten = to_.sputn(pbase(), count) == count;
+    setp(waiting_.data(), waiting_.data() + waiting_.size());
+    return isWritten ? 0 : -1;
+}
+
+ChecksumBuffer::int_type ChecksumBuffer::overflow(int_type c) {
+    if (sync() != 0) return traits_type::eof();
+    if (!traits_type::eq_int_type(c, traits_type::eof())) sputc(traits_type::to_char_type(c));
+    return traits_type::not_eof(c);
+}
+
+std::string ChecksumBuffer::line() {
+    if (sync() != 0) throw std::runtime_error("cannot be written");
+    return lineOf(sum_);
 }
 
 void requireChecksum(std::string_view file) {
