@@ -47,6 +47,7 @@ void MeshSort::run(const Json& identity, int round, const PlannedSigns* known) {
     folder_.create();
     // before the plan: a plan without some of its tiles can be resumed
     for (std::size_t tile = 0; round > 0 && !known && tile < tiling.size(); ++tile) folder_.remove(tiling.place(tile));
+    if (!known) folder_.removeRecords();  // of a plan that is lost
     folder_.removePlan();
     const auto fileOf = [&](std::size_t tile) { return folder_.triangles(tiling.place(tile)); };
     const std::vector<TileLoad> loads = sortTriangles(*mesh.source, tiling, a_.options.voxelSize, fileOf);

@@ -37,6 +37,10 @@ void TileFolder::removePlan() const {
     removeGrowth();
 }
 
+void TileFolder::removeRecords() const {
+    removeFromWork({".record"});
+}
+
 void TileFolder::removeGrowth() const {
     removeFromWork({".regions", ".by_distance", ".by_triangles", ".improved"});
 }

@@ -49,6 +49,8 @@ class TileFolder {
     void create() const;
     /// Removes the plan, then what tiles of earlier signs told each other.
     void removePlan() const;
+    /// Removes the records of all tiles, which are then built anew.
+    void removeRecords() const;
     /// Removes what depends on the sides of a flood's regions.
     void removeGrowth() const;
     /// Removes the files of a tile and its record.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <bilayer/sdf/grids.h>
+#include "tools/tiles/tile_folder.h"
 
 namespace bilayer::tools {
 
