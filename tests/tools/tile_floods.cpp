@@ -124,8 +124,8 @@ TEST_CASE("a build in tiles that was killed goes on, and finds damaged files of 
     CAPTURE(seed, sign);
     std::mt19937 random(seed);
     const Words options{"--resolution", "120", "--sign", sign};
-    const fs::path mesh = sign == "flood" ? shellsFile() : scratch("torus.ply"), folder = scratch("killed"),
-                   copy = scratch("killed copy");
+    const fs::path mesh = sign == "flood" ? shellsFile() : scratch("torus.ply"), folder = scratch("damaged"),
+                   copy = scratch("damaged copy");
     if (sign != "flood") writeMesh(mesh, shapes::torus(1, 0.4f, 96, 48));
     const Words words = tiled(mesh, folder, "3x2x2", options);
     const LevelSet whole = inOnePiece(mesh, options);
