@@ -59,22 +59,27 @@ std::optional<Contact> LocalField::probe(const glm::vec3& point, const FieldSamp
                                          std::uint32_t feature, float margin, ContactReport& report) const {
     ++report.pointsTested;
     if (sample.where == FieldSample::inside) ++report.beyondBand;
-    if (sample.distance - radius > margin) return speculativeContact(point, radius, feature, margin, sample.distance);
+    if (sample.distance - radius > margin) return speculativeContact(point, sample, radius, feature, margin);
     if (sample.where != FieldSample::nearSurface) return std::nullopt;
     return contact(point - sample.distance * sample.normal, sample.normal, sample.distance - radius, feature,
                    approach(point, sample.normal, margin), radius);
 }
 
 // For a point that is farther away: the contact where its path meets the surface.
-std::optional<Contact> LocalField::speculativeContact(const glm::vec3& point, float radius, std::uint32_t feature,
-                                                      float margin, float distance) const {
+std::optional<Contact> LocalField::speculativeContact(const glm::vec3& point, const FieldSample& sample, float radius,
+                                                      std::uint32_t feature, float margin) const {
     if (maxDisplacement_ <= margin) return std::nullopt;
     const glm::vec3 displacement = relativeMotion_.of(point);
     const float length = glm::length(displacement);
-    if (distance - radius > length) return std::nullopt;
+    if (sample.distance - radius > length) return std::nullopt;
     const Ray ray{point / scale_, displacement, length / scale_};
     const auto hit = radius > 0 ? field_.sphereCast(ray, radius / scale_) : field_.raycast(ray);
     if (!hit) return std::nullopt;
+    // within the tolerance of rays, a path that grazes an edge hits the face beyond it from behind: it passes
+    const bool isNextToSurface =
+        sample.where == FieldSample::nearSurface && sample.distance <= maxInterpolationError * voxel_;
+    if (isNextToSurface && glm::dot(displacement, sample.normal) < 0 && glm::dot(hit->normal, sample.normal) < 0)
+        return std::nullopt;
     const float separation = glm::dot(point - scale_ * hit->position, hit->normal);
     return contact(point - separation * hit->normal, hit->normal, std::max(separation - radius, 0.f), feature,
                    -glm::dot(displacement, hit->normal), radius);

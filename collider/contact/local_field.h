@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A field from the view of the other body of a pair: in metres, in the field's axes, with the relative motion of the
 // other body.
-// Tested by tests/bullet/edges.cpp through collideConvex().
+// Tested by tests/collider/local_field.cpp.
 #pragma once
 
 #include <cstdint>
@@ -56,8 +56,8 @@ class LocalField {
                     float approach = 0, float turningRadius = -1) const;
 
   private:
-    std::optional<Contact> speculativeContact(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
-                                              float distance) const;
+    std::optional<Contact> speculativeContact(const glm::vec3& point, const FieldSample& sample, float radius,
+                                              std::uint32_t feature, float margin) const;
     FieldSample exactSample(const glm::vec3& point, const Sample& sample) const;
     FieldSample sampleBeyondBand(const glm::vec3& point, float radius, float bound) const;
 
