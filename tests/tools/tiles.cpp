@@ -129,6 +129,14 @@ TEST_CASE("tiles whose records would not fit are refused") {
                  "the records of 64000 tiles need about");
 }
 
+TEST_CASE("an output that cannot be a folder is refused by its name") {
+    const fs::path mesh = scratch("box.ply"), file = scratch("a file");
+    writeMesh(mesh, shapes::box({1, 1, 1}));
+    std::ofstream(file) << "text";
+    checkRefusal(withNormals(mesh, file, "2x1x1", {"--resolution", "100"}), 1, "a file: Not a directory");
+    checkRefusal(withNormals(mesh, file / "inside", "2x1x1", {"--resolution", "100"}), 1, "inside: Not a directory");
+}
+
 TEST_CASE("a tile with a wrong byte is found and built again") {
     const fs::path mesh = largeMeshFile("byte.ply"), folder = scratch("byte");
     const Words words = withNormals(mesh, folder, "2x2x1", {"--resolution", "100"});

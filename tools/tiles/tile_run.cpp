@@ -9,6 +9,7 @@
 #include <optional>
 #include <regex>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -105,13 +106,14 @@ class TileRun {
   private:
     // No other build may write the folder. A new folder goes if there is nothing to build.
     void prepareAlone() {
-        const bool isNew = std::filesystem::create_directories(folder_.root());
+        std::error_code error;
+        const bool isNew = std::filesystem::create_directories(folder_.root(), error);
+        if (error) throw std::runtime_error(fmt::format("{}: {}", folder_.root().string(), error.message()));
         lock_.emplace(folder_.root());
         try {
             prepare();
         } catch (...) {
-            std::error_code notEmpty;
-            if (isNew) std::filesystem::remove(folder_.root(), notEmpty);
+            if (isNew) std::filesystem::remove(folder_.root(), error);  // unless it is not empty
             throw;
         }
     }
