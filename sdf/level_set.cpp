@@ -91,7 +91,7 @@ void requireLevelSet(const Grids& grids) {
     if (!grid.hasUniformVoxels() || !grid.transform().isLinear())
         throw std::invalid_argument(fmt::format("grid {} has voxels that are not cubes", quotedWord(grid.getName())));
     const double h = grid.voxelSize()[0];
-    requireEntry(h >= minStoredVoxel && h <= maxStoredVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
+    requireEntry(h >= double(minVoxelSize) && h <= maxVoxelSize, grid, "the edge of a voxel", h, "from 2e-5 to 1e15");
     requireWidth(grid, "the background", grid.background());
     if (grid.activeVoxelCount() == 0)
         throw std::invalid_argument(fmt::format("grid {} is empty", quotedWord(grid.getName())));

@@ -11,7 +11,7 @@
 #include <tuple>
 
 #include "collider/field/interpolant.h"
-#include "sdf/leaf/build_options.h"
+#include "sdf/base/voxel_limits.h"
 
 namespace bilayer::bullet {
 

@@ -5,7 +5,10 @@
 
 namespace bilayer::detail {
 
-/// Range of voxel sizes [m]: squared lengths from 1/1000 voxel to thousands of voxels stay within the float range.
-inline constexpr double minStoredVoxel = 1e-15, maxStoredVoxel = 1e15;
+/// Min edge of a voxel [m]: OpenVDB treats a transform with a determinant below 3e-15 as singular.
+inline constexpr float minVoxelSize = 2e-5f;
+
+/// Max edge of a voxel [m]: squared lengths of thousands of voxels stay within the float range.
+inline constexpr double maxVoxelSize = 1e15;
 
 }  // namespace bilayer::detail

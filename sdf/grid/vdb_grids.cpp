@@ -95,12 +95,12 @@ openvdb::GridPtrVec readAll(const std::filesystem::path& path) {
         stream.seekg(0);
         // With delayed loading, the values and any damage to them would stay in the file.
         grids = *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
+        const glm::dvec3 origin = originOf(grids);
+        for (const auto& grid : grids) shift(*grid, -origin);
     } catch (const std::exception& error) {
         throw std::runtime_error(
             fmt::format("{}: is not a .vdb file, or is damaged ({})", path.string(), oneLine(error.what())));
     }
-    const glm::dvec3 origin = originOf(grids);
-    for (const auto& grid : grids) shift(*grid, -origin);
     return grids;
 }
 

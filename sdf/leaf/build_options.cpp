@@ -38,12 +38,12 @@ void checkWidth(const char* option, float voxels, float voxelSize) {
 
 void checkVoxelSize(double voxelSize, const char* option) {
     double scale = unitStep;
-    if (voxelSize > maxStoredVoxel) {
-        while (voxelSize / scale > maxStoredVoxel) scale *= unitStep;
+    if (voxelSize > maxVoxelSize) {
+        while (voxelSize / scale > maxVoxelSize) scale *= unitStep;
         throw std::invalid_argument(
             fmt::format("{} {:g} is above {:g}, the largest that a field may have: scale the mesh by {:g}, so "
                         "that voxels are {:g}",
-                        option, voxelSize, maxStoredVoxel, 1 / scale, voxelSize / scale));
+                        option, voxelSize, maxVoxelSize, 1 / scale, voxelSize / scale));
     }
     if (voxelSize >= double(minVoxelSize)) return;
     while (scale * voxelSize < double(minVoxelSize)) scale *= unitStep;

@@ -9,9 +9,6 @@
 
 namespace bilayer::detail {
 
-/// OpenVDB treats a transform with a determinant below 3e-15 as singular [m].
-inline constexpr float minVoxelSize = 2e-5f;
-
 /// Maximum width of the band on either side [voxels].
 inline constexpr float maxWidthVoxels = 1000;
 

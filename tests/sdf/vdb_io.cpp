@@ -178,6 +178,29 @@ TEST_CASE("a file of ours with one wrong byte, or one too few or too many, is re
           torus().grids().distance->activeVoxelCount());
 }
 
+TEST_CASE("A file whose voxels are too small for OpenVDB is refused by an error that names it") {
+    const float voxelSize = 0.05f, tiny = 1e-6f;
+    for (const bool atOrigin : {true, false}) {
+        // OpenVDB makes no such grid: the sizes in the file are replaced
+        const LevelSet field = build(shapes::box({1, 1, 1}), {.voxelSize = voxelSize});
+        const openvdb::FloatGrid::Ptr grid = field.grids().distance->deepCopy();
+        if (!atOrigin) grid->insertMeta(metadata::origin, openvdb::Vec3DMetadata({1, 2, 3}));
+        const auto path = test::scratch("tiny_voxels.vdb");
+        openvdb::io::File(path.string()).write({grid});
+        std::string file = bytes(path);
+        const auto replaceAll = [&](double from, double to) {
+            const std::string old(reinterpret_cast<const char*>(&from), sizeof from);
+            const std::string other(reinterpret_cast<const char*>(&to), sizeof to);
+            for (std::size_t at = 0; (at = file.find(old, at)) != std::string::npos; at += sizeof to)
+                file.replace(at, sizeof to, other);
+        };
+        replaceAll(double(voxelSize), double(tiny));
+        std::ofstream(path, std::ios::binary) << file;
+        CHECK_THROWS_WITH(readVdb(path), Catch::Contains("tiny_voxels.vdb: ") &&
+                                             Catch::Contains(atOrigin ? "the edge of a voxel" : "damaged"));
+    }
+}
+
 TEST_CASE("text from a file is short and on one line in messages") {
     CHECK(detail::quotedWord("facet") == "'facet'");
     CHECK(detail::quotedWord(std::string(1000, 'a')) == "'" + std::string(40, 'a') + "...'");
