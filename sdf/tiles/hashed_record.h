@@ -7,12 +7,23 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace bilayer::detail {
+
+/// Returns check(), or false if it throws std::runtime_error: a file that it reads is missing or damaged.
+template <class Check>
+bool passes(const Check& check) {
+    try {
+        return check();
+    } catch (const std::runtime_error&) {
+        return false;
+    }
+}
 
 /// Collects values, and writes them as one file.
 class HashedRecordWriter {

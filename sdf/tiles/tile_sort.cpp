@@ -12,6 +12,7 @@
 #include "sdf/fill/triangle_limits.h"
 #include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
+#include "sdf/tiles/hashed_record.h"
 
 namespace bilayer::detail {
 namespace {
@@ -105,12 +106,10 @@ std::vector<TileTriangle> readTileTriangles(const std::filesystem::path& path, c
 }
 
 bool hasTileTriangles(const std::filesystem::path& path, const TileLoad& load) {
-    try {
+    return passes([&] {
         readTileTriangles(path, load);
         return true;
-    } catch (const std::runtime_error&) {
-        return false;
-    }
+    });
 }
 
 }  // namespace bilayer::detail

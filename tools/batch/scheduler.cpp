@@ -168,7 +168,7 @@ class Scheduler {
             const WorkerEnd end = worker.finish();
             Json known = Json::parse(end.answer, nullptr, /*allow_exceptions=*/false);
             if (!known.is_object()) known = {{"outcome", "failed"}, {"reason", end.reason}, {"error", end.error}};
-            if (worker.isUsed() && mayBeOfOthers(end, known)) {
+            if (hasEnded && worker.isUsed() && mayBeOfOthers(end, known)) {
                 tryAlone(*running_[i]);
                 continue;
             }
@@ -181,8 +181,7 @@ class Scheduler {
 
     // Whether what meshes before this one have left in the process may be why it failed: a new process decides.
     bool mayBeOfOthers(const WorkerEnd& end, const Json& known) const {
-        if (end.answer.empty()) return end.reason != "time limit";
-        return known["outcome"] == "failed" && plan_.limits.memory > 0;
+        return end.answer.empty() || (known["outcome"] == "failed" && plan_.limits.memory > 0);
     }
 
     void tryAlone(RunningMesh& running) {

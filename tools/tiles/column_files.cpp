@@ -2,29 +2,24 @@
 #include "tools/tiles/column_files.h"
 
 #include <filesystem>
-#include <stdexcept>
 
+#include "sdf/tiles/hashed_record.h"
 #include "sdf/tiles/tile_columns.h"
 
 namespace bilayer::tools {
 
 using namespace bilayer::detail;
 
-// A killed run may have left a tile's file.
-bool ColumnFiles::isWritten(const std::filesystem::path& file) const {
-    if (!std::filesystem::exists(file)) return false;
-    try {
-        readColumnSums(file);
-        return true;
-    } catch (const std::runtime_error&) {
-        return false;  // it is damaged
-    }
-}
-
 void ColumnFiles::write(std::size_t tile) const {
     const glm::ivec3 place = tiling_.place(tile);
     const TileLoad& load = plan_.loads()[tile];
-    if (load.triangles == 0 || isWritten(folder_.sums(place))) return;
+    if (load.triangles == 0) return;
+    // a killed run may have left the file
+    const bool isWritten = passes([&] {
+        readColumnSums(folder_.sums(place));
+        return true;
+    });
+    if (isWritten) return;
     const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), load);
     writeColumnSums(folder_.sums(place), crossingsOf(triangles, tiling_, tile, plan_.voxelSize()));
 }

@@ -27,8 +27,6 @@ class ColumnFiles {
     std::uint64_t readBytes() const { return readBytes_; }  ///< of files, in all
 
   private:
-    bool isWritten(const std::filesystem::path& file) const;
-
     const TileFolder& folder_;
     const TilePlan& plan_;
     const detail::Tiling& tiling_;

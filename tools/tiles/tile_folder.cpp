@@ -126,13 +126,7 @@ bool isIntact(const TileFolder& folder, const Json& record) {
 }
 
 bool isFinished(const TileFolder& folder, const glm::ivec3& tile) {
-    const std::filesystem::path record = folder.record(tile);
-    if (!std::filesystem::exists(record)) return false;
-    try {
-        return isIntact(folder, readRecord(record));
-    } catch (const std::runtime_error&) {
-        return false;  // it is damaged
-    }
+    return passes([&] { return isIntact(folder, readRecord(folder.record(tile))); });
 }
 
 }  // namespace bilayer::tools
