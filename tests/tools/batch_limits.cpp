@@ -78,6 +78,10 @@ TEST_CASE("a mesh that takes too long is ended alone") {
     CHECK(record["reason"] == "time limit");
     CHECK(record["error"] == "took longer than the time limit of 0.7 s");
     CHECK(record["seconds"]["total"].get<double>() < 5);
+    // what was known by then
+    CHECK(record["triangles"] == shapes::sphere(hugeRadius, 5).triangles.size());
+    CHECK(record["sourceHash"].get<std::string>().size() == 16);
+    CHECK(record["estimatedBytes"].get<double>() > 1e6);
 }
 
 TEST_CASE("a mesh that needs too much memory is ended alone") {
@@ -86,6 +90,7 @@ TEST_CASE("a mesh that needs too much memory is ended alone") {
     CHECK(record["reason"] == "memory limit");
     CHECK(record["error"].get<std::string>().find("128 MiB") != std::string::npos);
     CHECK(record["peakBytes"].get<double>() < 400e6);
+    CHECK(record["triangles"] == shapes::sphere(hugeRadius, 5).triangles.size());
 }
 
 TEST_CASE("an importer that lacks memory does not call a file empty or damaged") {
@@ -126,6 +131,7 @@ TEST_CASE("a crash ends one mesh alone") {
     CHECK(records.at("z.ply")["outcome"] == "done");
     CHECK(records.at("sphere.ply")["outcome"] == "failed");
     CHECK(records.at("sphere.ply")["reason"] == "crash");
+    CHECK(records.at("sphere.ply")["triangles"] == shapes::sphere(hugeRadius, 5).triangles.size());
     CHECK(records.at("sphere.ply")["error"].get<std::string>().find("signal " + std::to_string(signal)) !=
           std::string::npos);
     CHECK(leftovers(output).empty());

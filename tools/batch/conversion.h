@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "tools/build.h"
@@ -28,6 +29,9 @@ struct ConversionTask {
     bool mayBeLarge = false;  ///< builds a large mesh too, instead of handing it back
 };
 
+/// Is given what a record has so far, in case that the conversion ends the process.
+using TellKnown = std::function<void(const Json&)>;
+
 /// Converts a mesh unless its output is up to date: made from a file of the same contents with the same options.
 ///
 /// Returns the fields of the mesh's record: "outcome" and what is known of the mesh. Outcomes are:
@@ -36,6 +40,6 @@ struct ConversionTask {
 /// - "large": the mesh must be built alone; "estimatedBytes" states how much memory it needs;
 /// - "failed": "error" states why.
 /// The work folder holds a thumbnail if the mesh was read. Throws std::bad_alloc.
-Json convert(const ConversionOptions& options, const ConversionTask& task);
+Json convert(const ConversionOptions& options, const ConversionTask& task, const TellKnown& tell);
 
 }  // namespace bilayer::tools

@@ -126,19 +126,25 @@ class Scheduler {
     std::unique_ptr<Workplace> newWorkplace() {
         const std::string name = fmt::format("{}.{}", records_.path().stem().string(), workplaceCount_++);
         const fs::path folder = plan_.folder.work() / name;
-        const auto work = [this, folder](const WorkerTask& task) {
-            return convert(task, folder).dump(-1, ' ', false, Json::error_handler_t::replace);
+        const auto work = [this, folder](const WorkerTask& task, const Worker::Tell& tell) {
+            return packed(convert(task, folder, [&](const Json& known) { tell(packed(known)); }));
         };
         return std::unique_ptr<Workplace>(new Workplace{{folder, locks_}, {plan_.limits, work}});
     }
 
-    Json convert(const WorkerTask& task, const fs::path& folder) const {
+    static std::string packed(const Json& record) {
+        return record.dump(-1, ' ', false, Json::error_handler_t::replace);
+    }
+
+    Json convert(const WorkerTask& task, const fs::path& folder, const TellKnown& tell) const {
         const BatchMesh& mesh = plan_.meshes[task.mesh];
-        return tools::convert(plan_.conversion, {.mesh = mesh.file,
-                                                 .output = plan_.folder.field(mesh.name),
-                                                 .work = folder,
-                                                 .threads = task.threads,
-                                                 .mayBeLarge = task.isLarge || plan_.threads == 1});
+        return tools::convert(plan_.conversion,
+                              {.mesh = mesh.file,
+                               .output = plan_.folder.field(mesh.name),
+                               .work = folder,
+                               .threads = task.threads,
+                               .mayBeLarge = task.isLarge || plan_.threads == 1},
+                              tell);
     }
 
     // Waits until a worker answers, ends or is late, a signal arrives, or something is to be looked at again.
@@ -166,8 +172,7 @@ class Scheduler {
             const bool hasEnded = ready_[i] && !worker.read();
             if (!hasEnded && worker.millisecondsLeft() != 0) continue;
             const WorkerEnd end = worker.finish();
-            Json known = Json::parse(end.answer, nullptr, /*allow_exceptions=*/false);
-            if (!known.is_object()) known = {{"outcome", "failed"}, {"reason", end.reason}, {"error", end.error}};
+            Json known = knownFrom(end);
             if (hasEnded && worker.isUsed() && mayBeOfOthers(end, known)) {
                 tryAlone(*running_[i]);
                 continue;
@@ -177,6 +182,14 @@ class Scheduler {
                 idle_.push_back(std::move(running_[i]->place));
             running_.erase(running_.begin() + std::ptrdiff_t(i));
         }
+    }
+
+    static Json knownFrom(const WorkerEnd& end) {
+        const bool hasAnswered = !end.answer.empty();
+        Json known = Json::parse(hasAnswered ? end.answer : end.told, nullptr, /*allow_exceptions=*/false);
+        if (!known.is_object()) known = Json::object();
+        if (!hasAnswered) known.update({{"outcome", "failed"}, {"reason", end.reason}, {"error", end.error}});
+        return known;
     }
 
     // Whether what meshes before this one have left in the process may be why it failed: a new process decides.
