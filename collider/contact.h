@@ -57,8 +57,8 @@ struct Contact {
     /// The surface point's index, or the point count plus the index of the sharp edge that the contact lies on. The top
     /// bit is set for features of B, clear for features of A.
     std::uint32_t feature;
-    /// How far the predicted motion reduces the distance [m]. Non-zero only if the motion moves some point farther than
-    /// the margin.
+    /// How far the predicted motion reduces the distance [m]. Non-zero only if the motion moves points where the bodies
+    /// can touch farther than the margin.
     float approach = 0;
     /// The rounding radius of a vertex or edge that the contact position is fixed to, on the body that owns the feature
     /// [m]; the position rotates with that body. Negative: the position is the closest point of two surfaces, and

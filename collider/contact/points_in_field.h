@@ -38,12 +38,12 @@ class PointsInField {
           clearance_(field().data().coarse),
           options_(options),
           reach_(options.margin / other.scale) {
-        const Bounds& bounds = body.collider.bounds();
-        centre_ = bounds.centre();
-        radius_ = 0.5f * glm::length(bounds.size());
-        const float inBand = surelyInBand(field().exteriorWidth(), field().voxelSize());
+        const Bounds &bounds = body.collider.bounds(), &otherBounds = other.collider.bounds();
+        centre_ = bounds.centre(), radius_ = 0.5f * glm::length(bounds.size());
+        // contacts are in the boxes of both bodies: so the points of either approach, or those of neither
         speculative_ =
-            maxDisplacement(centre_, radius_) > (range == ContactRange::margin ? reach_ : std::min(reach_, inBand));
+            std::min(maxDisplacement(transform_(centre_), body_.scale * radius_ / other_.scale),
+                     maxDisplacement(otherBounds.centre(), 0.5f * glm::length(otherBounds.size()))) > maxReach(range);
     }
 
     /// Calls found(index, point, sample) for the points within the margin of the surface, inside it, or predicted to
@@ -88,14 +88,25 @@ class PointsInField {
 
     const Field& field() const { return surface_.field(); }
 
-    // An upper bound of the displacements of the body's points in a sphere, in the other body's units.
-    float maxDisplacement(const glm::vec3& centre, float radius) const {
-        return relativeMotion_.maxDisplacement(other_.scale * transform_(centre), body_.scale * radius) / other_.scale;
+    // The distance to which contacts are certainly found without speculative ones, of either body's points.
+    float maxReach(ContactRange range) const {
+        if (range == ContactRange::margin) return reach_;
+        const auto inBand = [](const Placed& of) {
+            const Field& field = of.collider.field();
+            return of.scale * surelyInBand(field.exteriorWidth(), field.voxelSize());
+        };
+        return std::min(reach_, std::min(inBand(body_), inBand(other_)) / other_.scale);
     }
 
-    // Max distance of points in a sphere that may make a contact.
+    // An upper bound of the displacements of the body's points in a sphere, all in the other body's units.
+    float maxDisplacement(const glm::vec3& centre, float radius) const {
+        return relativeMotion_.maxDisplacement(other_.scale * centre, other_.scale * radius) / other_.scale;
+    }
+
+    // Max distance of the body's points in a sphere that may make a contact.
     float maxContactDistance(const glm::vec3& centre, float radius) const {
-        return speculative_ ? reach_ + maxDisplacement(centre, radius) : reach_;
+        if (!speculative_) return reach_;
+        return reach_ + maxDisplacement(transform_(centre), body_.scale * radius / other_.scale);
     }
 
     // Min distance at which points can be rejected [coarse cells].

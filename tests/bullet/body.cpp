@@ -57,7 +57,7 @@ std::vector<btTransform> heap(const std::shared_ptr<const Collider>& knot,
 
 TEST_CASE("Bodies from files move as those of meshes, to the bit") {
     const Pair knot = bodyOf(shapes::torusKnot(2, 3, 0.25f, 0.08f, 200, 16), 0.02f);
-    const Pair slab = bodyOf(shapes::box({1, 1, 0.1f}, 4), 0.04f);
+    const Pair slab = bodyOf(shapes::box({2, 2, 0.1f}, 4), 0.04f);
     const auto expected = heap(knot.made, slab.made), poses = heap(knot.loaded, slab.loaded);
     REQUIRE(poses.size() == expected.size());
     for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -87,7 +87,7 @@ TEST_CASE("A shape of a body from a file has its margin, its inertia and its box
 }
 
 TEST_CASE("A shape's own margin goes before that of its body") {
-    const Pair slab = bodyOf(shapes::box({1, 1, 0.1f}, 4), 0.04f);
+    const Pair slab = bodyOf(shapes::box({2, 2, 0.1f}, 4), 0.04f);
     CHECK(Shape(slab.loaded, {.margin = 0.01f}).getMargin() == 0.01f);
 }
 }  // namespace bilayer::body_test

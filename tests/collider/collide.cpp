@@ -278,6 +278,27 @@ TEST_CASE("bodies that approach from beyond the band get contacts, at any margin
     CHECK(corners >= 4);
 }
 
+TEST_CASE("The contacts of a step have the approach of its motion, on the points of either body, or none has") {
+    const float margin = 2 * h, radius = glm::length(brick().bounds().size()) / 2;
+    for (const float fraction : {0.5f, 3.f}) {
+        // the corners of the slab, far from the brick, move farther than the margin in both cases
+        const glm::vec3 rotation(fraction * margin / radius, 0, 0);
+        const Placed lying{slab()}, tilting{brick(), {{0, 0, 0.2f - 0.1f * h}}, 1, {.rotation = rotation}};
+        std::vector<Contact> contacts;
+        collide(lying, tilting, {.margin = margin}, contacts);
+        int ofSlab = 0, ofBrick = 0;
+        for (const Contact& contact : contacts) {
+            if (contact.distance > 0) continue;  // the path of a point beside an edge may pass it
+            const glm::vec3 moved = glm::cross(rotation, contact.position - tilting.pose.position);
+            const float expected = fraction > 1 ? std::max(glm::dot(moved, contact.normal), 0.f) : 0;
+            CHECK(contact.approach == Approx(expected).margin(0.05 * h));
+            ++(contact.feature & featureOfB ? ofBrick : ofSlab);
+        }
+        CHECK(ofSlab > 10);
+        CHECK(ofBrick > 10);
+    }
+}
+
 namespace {
 
 // Surface points with a contact closer than the margin by more than `tolerance`, in ascending order.

@@ -16,7 +16,7 @@ using demo::Thing;
 namespace {
 
 constexpr float voxel = 0.04f, half = 0.4f;  // [m]
-constexpr float lane = 4;                    // between pairs [m]
+constexpr float lane = 6;                    // between pairs [m]
 
 // Extrudes along y. The profile, in x and z, is counter-clockwise and star-shaped: entirely visible from a point
 // within.
@@ -67,7 +67,7 @@ TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest
     std::mt19937 random(start);
     std::uniform_real_distribution<float> any(-1, 1);
     demo::Stage stage("degenerate bodies");
-    const auto floor = thingOf(shapes::box({1.8f, 1.8f, half}), measure);
+    const auto floor = thingOf(shapes::box({lane / 2 - 0.2f, lane / 2 - 0.2f, half}), measure);
     std::vector<std::shared_ptr<const Thing>> upright, over;
     for (const Mesh& mesh : degenerates()) {
         upright.push_back(thingOf(mesh, measure));
