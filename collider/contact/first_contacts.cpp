@@ -34,6 +34,10 @@ constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float directionOffset = 0.3f;  // [rad]
 // The tilts and shifts at which the reduction error is measured [rad], [fractions of the extent].
 constexpr float errorProbeSize = 1.f / 32;
+// A body's radius of gyration, where it is stopped by the contacts of a patch [fractions of the extent], and the
+// iterations that find out where it stops.
+constexpr float gyration = 0.3f;
+constexpr int stopSweeps = 60;
 // Limit of contacts in a patch: more would cost the solver more than they help.
 constexpr std::size_t maxContacts = 3 * patchSize;
 
@@ -42,6 +46,12 @@ constexpr std::size_t maxContacts = 3 * patchSize;
 struct Perturbation {
     glm::vec2 tilt{0}, shift{0};
     float twist = 0;
+};
+
+/// How contacts change the motion of A in a step: along the normal [m], and tilts about the axes of a patch [rad].
+struct Stop {
+    float rise = 0;
+    glm::vec2 tilt{0};
 };
 
 glm::vec2 directionAt(float share) {
@@ -115,6 +125,7 @@ class Separations {
             const Contact& contact = contacts[group[k]];
             const glm::vec3 torque = glm::cross(contact.position - centre, contact.normal);
             column(gap)[k] = gapOf(contact);
+            column(left)[k] = std::max(contact.distance, 0.f) - contact.approach;
             column(tiltX)[k] = glm::dot(torque, x);
             column(tiltY)[k] = glm::dot(torque, y);
             column(shiftX)[k] = extent_ * glm::dot(contact.normal, x);
@@ -163,15 +174,46 @@ class Separations {
         return std::uint32_t(std::min_element(now, now + count_) - now);
     }
 
+    /// How some contacts change the predicted motion of A if it gets no deeper there. A is a body of unit mass, with a
+    /// radius of gyration of `gyration`.
+    Stop stopBy(const std::vector<std::uint32_t>& some) const {
+        const float arm = gyration * extent_, perInertia = 1 / (arm * arm);
+        std::vector<float> impulses(some.size(), 0);
+        Stop stop;
+        for (int sweep = 0; sweep < stopSweeps; ++sweep)
+            for (std::size_t i = 0; i < some.size(); ++i) {
+                const glm::vec2 torque = torqueOf(some[i]);
+                const float mobility = 1 + perInertia * glm::dot(torque, torque);
+                const float before =
+                    std::exchange(impulses[i], std::max(impulses[i] - leftAfter(some[i], stop) / mobility, 0.f));
+                stop.rise += impulses[i] - before;
+                stop.tilt += perInertia * (impulses[i] - before) * torque;
+            }
+        return stop;
+    }
+
+    /// The contact that is deepest after the predicted motion and its stop, and how much deeper than before, or than
+    /// touching, it is then [m].
+    std::pair<std::uint32_t, float> deepestAfter(const Stop& stop) const {
+        std::pair<std::uint32_t, float> deepest(0, -std::numeric_limits<float>::max());
+        for (std::uint32_t k = 0; k < count_; ++k)
+            if (const float depth = -leftAfter(k, stop); depth > deepest.second) deepest = {k, depth};
+        return deepest;
+    }
+
     float extent() const { return extent_; }
     /// The rotation in the step of a body whose one side is stopped while the other one moves on [rad].
     float rotation() const { return rotation_; }
 
   private:
     static constexpr std::size_t lanes = 8;
-    enum Column { gap, tiltX, tiltY, shiftX, shiftY, twist, moved, columns };
+    enum Column { gap, left, tiltX, tiltY, shiftX, shiftY, twist, moved, columns };
     float* column(Column which) { return numbers_.data() + which * padded_; }
     float at(Column which, std::uint32_t k) const { return numbers_[which * padded_ + k]; }
+    glm::vec2 torqueOf(std::uint32_t k) const { return {at(tiltX, k), at(tiltY, k)}; }
+    float leftAfter(std::uint32_t k, const Stop& stop) const {
+        return at(left, k) + stop.rise + glm::dot(stop.tilt, torqueOf(k));
+    }
 
     std::size_t count_, padded_;
     std::vector<float> numbers_;  ///< stored by columns
@@ -185,6 +227,7 @@ class FirstContactSearch {
         : separations_(contacts, group, rotation) {
         static const std::vector<Perturbation> all = perturbations();
         perturbations_ = all;
+        isStraight_ = std::max(rotation, separations_.rotation()) < maxStraightRotation;
         if (separations_.rotation() > tilts[0]) {
             addTilts(separations_.rotation(), withRotation_);
             withRotation_.insert(withRotation_.end(), all.begin(), all.end());
@@ -208,6 +251,7 @@ class FirstContactSearch {
         while (kept_.size() > maxContacts) remove(whichToRemove());
         // where separations exceed floats, no motion meets any
         if (kept_.empty()) add(separations_.nearest());
+        if (isStraight_ && separations_.rotation() > 0) addMissed();
         return kept_;
     }
 
@@ -246,6 +290,18 @@ class FirstContactSearch {
                 met |= Motions(1) << n;
         }
         return met;
+    }
+
+    // The choice prefers contacts that bear a body to those that its other side has still to reach. Adds those that get
+    // too deep where the chosen ones stop the body.
+    void addMissed() {
+        for (std::size_t n = 0; n < patchSize; ++n) {
+            const auto [deepest, depth] = separations_.deepestAfter(separations_.stopBy(kept_));
+            const bool isKept = std::find(kept_.begin(), kept_.end(), deepest) != kept_.end();
+            if (isKept || depth <= reductionTolerance * separations_.extent()) return;
+            if (kept_.size() == maxContacts) remove(whichToRemove());
+            add(deepest);
+        }
     }
 
     void add(std::uint32_t k) {
@@ -296,6 +352,7 @@ class FirstContactSearch {
     }
 
     Separations separations_;
+    bool isStraight_;                         ///< whether contacts approach and are stopped on straight paths
     std::vector<Perturbation> withRotation_;  ///< including those of a body that rotates in the step
     std::span<const Perturbation> perturbations_;
     std::vector<float> minSeparations_;  ///< minimum separation after each motion

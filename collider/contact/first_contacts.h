@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The contacts of a patch that small motions of the bodies meet first.
-// Tested by tests/collider/contact_reduction.cpp through reduce().
+// Tested by tests/collider/first_contacts.cpp and contact_reduction.cpp through reduce().
 #pragma once
 
 #include <bilayer/collider/contact.h>
