@@ -17,6 +17,8 @@
 #include <bilayer/sdf/surface.h>
 #include "collider/contact/body.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/base/usable_memory.h"
+#include "sdf/tiles/tile_manifest.h"
 #include "tools/commands.h"
 #include "tools/output.h"
 
@@ -46,10 +48,7 @@ bool parsePoint(const std::string& line, glm::dvec3& point) {
     return line.find_first_not_of(blanks, at) == std::string::npos;
 }
 
-void runQuery(const FieldArguments& a) {
-    const LevelSet levelSet = detail::readStored(a.field).levelSet;
-    const Field field(levelSet);
-    const glm::dvec3 origin = levelSet.origin();
+void answerQueries(const auto& field, const glm::dvec3& origin) {
     std::ios::sync_with_stdio(false);
     std::string line;
     for (std::size_t count = 1;; ++count) {
@@ -66,9 +65,26 @@ void runQuery(const FieldArguments& a) {
     if (std::cin.bad()) throw std::runtime_error("cannot read standard input: is it closed, or a folder?");
 }
 
+void runQuery(const FieldArguments& a) {
+    if (std::filesystem::is_directory(a.field)) {
+        const TiledField field(a.field, std::size_t(detail::usableMemory() / 2));
+        return answerQueries(field, detail::readTileManifest(a.field).origin);
+    }
+    const LevelSet levelSet = detail::readStored(a.field).levelSet;
+    answerQueries(Field(levelSet), levelSet.origin());
+}
+
+// @param command  which needs the field in one piece
+LevelSet readWhole(const std::filesystem::path& path, const char* command) {
+    if (std::filesystem::is_directory(path))
+        throw std::runtime_error(fmt::format("{}: {} takes one file: join the tiles of a folder with bilayer merge",
+                                             path.string(), command));
+    return detail::readStored(path).levelSet;
+}
+
 void runSurface(const FieldArguments& a) {
     requireOther(a.output, a.field);
-    const LevelSet field = detail::readStored(a.field).levelSet;
+    const LevelSet field = readWhole(a.field, "surface");
     requireWritable(a.output);
     const Mesh mesh = surface(field, a.options);
     if (mesh.triangles.empty())
@@ -82,7 +98,7 @@ void runSurface(const FieldArguments& a) {
 
 void runExport(const FieldArguments& a) {
     requireOther(a.output, a.field);
-    const LevelSet field = detail::readStored(a.field).levelSet;
+    const LevelSet field = readWhole(a.field, "export");
     requireWritable(a.output);
     writeNanoVdb(a.output, field);
     const std::uint64_t size = std::filesystem::file_size(a.output);
@@ -118,7 +134,7 @@ void addQuery(CLI::App& app) {
         "query",
         "Read points x y z from standard input, a line each; print distance, gradient and whether in the band");
     const auto a = std::make_shared<FieldArguments>();
-    command->add_option("field", a->field, "a .vdb file")->required();
+    command->add_option("field", a->field, "a .vdb file, or a folder of tiles")->required();
     command->callback([a] { runQuery(*a); });
 }
 

@@ -10,14 +10,18 @@
 #include <stdexcept>
 
 #include <bilayer/cl/device.h>
+#include <bilayer/collider/field.h>
 #include <bilayer/collider/mass.h>
 #include <bilayer/integration/bullet/settings.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "collider/contact/body.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/tiles/tile_manifest.h"
 #include "tools/commands.h"
 #include "tools/output.h"
+#include "tools/tiles/tile_folder.h"
+#include "tools/tiles/tile_plan.h"
 
 namespace bilayer::tools {
 
@@ -185,7 +189,28 @@ Json inVoxels(float width, const LevelSet& field) {
     return std::round(1e5 * double(width) / double(field.voxelSize())) / 1e5;
 }
 
+// Opening the folder checks what all queries need.
+void runInfoOfTiles(const ReportArguments& a) {
+    const TiledField field(a.input, 0);
+    const Json manifest = readJson(a.input / "manifest.json");
+    if (a.json) return print(manifest);
+    Table table(a.input.string());
+    table.row("voxel size", metres(field.voxelSize()));
+    table.row("band", fmt::format("{:.6g} voxels outside, {:.6g} inside", field.exteriorWidth() / field.voxelSize(),
+                                  field.interiorWidth() / field.voxelSize()));
+    table.row("bounds", boxText(field.bounds(), readTileManifest(a.input).origin));
+    try {
+        table.row("method", manifest.at("field").at("method"));
+        addTileRows(table, manifest);
+        if (const Json& hash = manifest.at("mesh").at("hash"); !hash.is_null()) table.row("mesh hash", hash);
+    } catch (const Json::exception& error) {
+        throw std::runtime_error(fmt::format("{}/manifest.json: is damaged ({})", a.input.string(), error.what()));
+    }
+    table.print();
+}
+
 void runInfo(const ReportArguments& a) {
+    if (std::filesystem::is_directory(a.input)) return runInfoOfTiles(a);
     const auto [field, body] = readStored(a.input);
     const Json grids = gridList(a.input);
     const std::optional<MassProperties> mass = body ? body->mass : massOf(field);
@@ -287,7 +312,7 @@ void addInspect(CLI::App& app) {
 
 void addInfo(CLI::App& app) {
     auto* command = app.add_subcommand("info", "Show the contents of a .vdb file");
-    const auto a = addArguments(*command, "field", "a .vdb file");
+    const auto a = addArguments(*command, "field", "a .vdb file, or a folder of tiles");
     command->callback([a] { runInfo(*a); });
 }
 

@@ -159,6 +159,27 @@ TEST_CASE("a tile with a wrong byte is found and built again") {
     CHECK(built(words)["tiles"] == again["tiles"]);
 }
 
+TEST_CASE("A folder of tiles is described and queried like a file") {
+    const fs::path mesh = largeMeshFile("described.ply"), folder = scratch("described");
+    const Words size{"--resolution", "100"};
+    const nlohmann::json manifest = built(withNormals(mesh, folder, "2x2x1", size));
+    CHECK(nlohmann::json::parse(run({"info", folder.string(), "--json"}).out) == manifest);
+    const std::string text = run({"info", folder.string()}).out;
+    for (const char* row : {"3 voxels outside, 3 inside", "2 x 2 x 1, 4 of them with leaves", "normals: "})
+        CHECK_THAT(text, Catch::Contains(row));
+    const fs::path file = scratch("described.vdb");
+    REQUIRE(run({"merge", folder.string(), "-o", file.string()}).status == 0);
+    const std::string points = "1.1 0 0\n0 1.2 0.1\n-1 0.3 0\n7 7 7\n";
+    const Result ofFolder = run({"query", folder.string()}, {.input = points});
+    CHECK(ofFolder.status == 0);
+    CHECK(ofFolder.out == run({"query", file.string()}, {.input = points}).out);
+
+    checkRefusal({"surface", folder.string(), "-o", scratch("described_surface.ply").string()}, 1, "bilayer merge");
+    checkRefusal({"info", scratch("no_tiles").string()}, 1, "no_tiles");
+    std::ofstream(folder / "manifest.json") << "{}";
+    checkRefusal({"info", folder.string()}, 1, "manifest.json");
+}
+
 TEST_CASE("memory is stated and kept, or the build is refused before its first tile") {
     const fs::path mesh = largeMeshFile("memory.ply"), folder = scratch("memory");
     const Words size{"--resolution", "500"};
@@ -167,7 +188,9 @@ TEST_CASE("memory is stated and kept, or the build is refused before its first t
     CHECK(!fs::exists(folder / "tile_0_0_0.vdb"));
     fs::remove_all(folder);
     const nlohmann::json manifest = built(withNormals(mesh, folder, "4x4x2", joined(size, {"--memory", "300"})));
-    CHECK(manifest["sum"]["peakRssBytes"].get<double>() < 300.0 * (1 << 20));
+    const double stated = manifest["sum"]["estimatedBytes"];
+    CHECK(manifest["sum"]["peakRssBytes"].get<double>() < stated);
+    CHECK(stated < 300.0 * (1 << 20));
     const fs::path object = scratch("memory.obj");
     writeMesh(object, shapes::sphere(1, 8));
     checkRefusal(withNormals(object, scratch("object"), "2x2x2", {"--resolution", "50", "--memory", "130"}), 1,

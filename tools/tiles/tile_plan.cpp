@@ -149,6 +149,22 @@ Json TilePlan::manifest(const std::vector<Json>& records, int ranks) const {
     return manifest;
 }
 
+void addTileRows(Table& table, const Json& manifest) {
+    const Json &counts = manifest.at("field").at("tiles"), &sum = manifest.at("sum"), &signs = manifest.at("signs");
+    table.row("tiles", fmt::format("{} x {} x {}, {} of them with leaves", counts[0].get<int>(), counts[1].get<int>(),
+                                   counts[2].get<int>(), sum.at("files").get<std::size_t>()));
+    table.row("leaves", grouped(sum.at("leaves")));
+    table.row("active voxels", grouped(sum.at("activeVoxels")));
+    table.row("triangles", grouped(manifest.at("mesh").at("triangles")));
+    if (!signs.is_null())
+        table.row("signs",
+                  fmt::format("{}: {}", signs.at("name").get<std::string>(), signs.at("reason").get<std::string>()));
+    table.row("sorted in", fmt::format("{:.3f} s, peak memory {}", manifest.at("sorting").at("seconds").get<double>(),
+                                       bytes(manifest.at("sorting").at("peakRssBytes"))));
+    table.row("built in", fmt::format("{:.3f} s of all tiles", sum.at("seconds").get<double>()));
+    table.row("peak memory", bytes(sum.at("peakRssBytes")));
+}
+
 Json recordOf(const glm::ivec3& place, const BlockBox& box, std::uint64_t triangles, const BuiltTile& tile) {
     Json faces = Json::array();
     if (tile.grids)

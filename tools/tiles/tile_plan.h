@@ -50,6 +50,9 @@ class TilePlan {
 Json recordOf(const glm::ivec3& place, const detail::BlockBox& box, std::uint64_t triangles,
               const detail::BuiltTile& tile);
 
+/// What the manifest of a field says of its tiles, its mesh and its build.
+void addTileRows(Table& table, const Json& manifest);
+
 /// Returns the place of a record's tile.
 glm::ivec3 placeOf(const Json& record);
 

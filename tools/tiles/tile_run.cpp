@@ -62,24 +62,6 @@ glm::ivec3 countsOf(const std::string& text) {
     return {std::stoi(match[1]), std::stoi(match[2]), std::stoi(match[3])};
 }
 
-void printTable(const Json& manifest, const std::string& folder) {
-    Table table(folder);
-    const Json& counts = manifest.at("field").at("tiles");
-    const Json& sum = manifest.at("sum");
-    table.row("tiles", fmt::format("{} x {} x {}, {} of them with leaves", counts[0].get<int>(), counts[1].get<int>(),
-                                   counts[2].get<int>(), sum.at("files").get<std::size_t>()));
-    table.row("leaves", grouped(sum.at("leaves")));
-    table.row("triangles", grouped(manifest.at("mesh").at("triangles")));
-    if (const Json& signs = manifest.at("signs"); !signs.is_null())
-        table.row("signs",
-                  fmt::format("{}: {}", signs.at("name").get<std::string>(), signs.at("reason").get<std::string>()));
-    table.row("sorted in", fmt::format("{:.3f} s, peak memory {}", manifest.at("sorting").at("seconds").get<double>(),
-                                       bytes(manifest.at("sorting").at("peakRssBytes"))));
-    table.row("built in", fmt::format("{:.3f} s of all tiles", sum.at("seconds").get<double>()));
-    table.row("peak memory", bytes(sum.at("peakRssBytes")));
-    table.print();
-}
-
 /// The work of one rank.
 class TileRun {
   public:
@@ -100,7 +82,10 @@ class TileRun {
         }
         if (!ranks_.isFirst()) return;
         const Json manifest = readJson(folder_.manifest());
-        a_.json ? print(manifest) : printTable(manifest, a_.output.string());
+        if (a_.json) return print(manifest);
+        Table table(a_.output.string());
+        addTileRows(table, manifest);
+        table.print();
     }
 
   private:
@@ -209,15 +194,21 @@ class TileRun {
         return tileBytes(load.triangles, load.area, tiling, tile, options_);
     }
 
-    // Refuses, before any tile is built, what would not fit.
-    void stateMemory(const TilePlan& plan, const Tiling& tiling) const {
+    double largestNeed(const TilePlan& plan, const Tiling& tiling) const {
         double largest = 0;
         for (std::size_t tile = 0; tile < tiling.size(); ++tile) largest = std::max(largest, need(plan, tiling, tile));
+        return largest;
+    }
+
+    static double bytesOfRecords(const Tiling& tiling) { return bytesOfJoin + double(tiling.size()) * bytesPerRecord; }
+
+    // Refuses, before any tile is built, what would not fit.
+    void stateMemory(const TilePlan& plan, const Tiling& tiling) const {
+        const double largest = largestNeed(plan, tiling), join = bytesOfRecords(tiling);
         if (largest > budget_)
             throw std::runtime_error(
                 fmt::format("the largest of {} tiles needs about {:.0f} MiB, and {:.0f} MiB are given: take more tiles",
                             tiling.size(), largest / mib, budget_ / mib));
-        const double join = bytesOfJoin + double(tiling.size()) * bytesPerRecord;
         if (join > budget_)
             throw std::runtime_error(fmt::format(
                 "the records of {} tiles need about {:.0f} MiB, and {:.0f} MiB are given: take fewer, larger tiles",
@@ -329,7 +320,9 @@ class TileRun {
             throw std::invalid_argument(
                 "the half width is too small for this voxel size: no voxel lies within the band");
         if (!plan.signs().areByFlood()) joinSides(records, counts_);
-        writeJson(folder_.manifest(), plan.manifest(records, ranks_.count));
+        Json manifest = plan.manifest(records, ranks_.count);
+        manifest["sum"]["estimatedBytes"] = std::uint64_t(std::max(largestNeed(plan, tiling), bytesOfRecords(tiling)));
+        writeJson(folder_.manifest(), manifest);
         folder_.clean();
     }
 
