@@ -20,7 +20,8 @@ void requireInputFile(const std::filesystem::path& path) {
     require(status.type() != std::filesystem::file_type::not_found, "no such file");
     require(status.type() != std::filesystem::file_type::none, error.message());
     require(std::filesystem::is_regular_file(status), "not a regular file");
-    require(::access(path.c_str(), R_OK) == 0, std::generic_category().message(errno));
+    const bool isReadable = ::access(path.c_str(), R_OK) == 0;
+    require(isReadable, std::generic_category().message(errno));
 }
 
 std::string lowerEnding(const std::filesystem::path& path) {

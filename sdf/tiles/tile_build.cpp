@@ -55,7 +55,7 @@ BuiltTile buildTile(std::span<const TileTriangle> triangles, const MeshFacts& fa
     if (filled.conflicts > 0 && signs.check != NormalsCheck::count)
         throw std::invalid_argument(fmt::format(
             "the normals contradict each other at {} places of one tile, and only the whole mesh can decide the sides: "
-            "take the sign auto or winding, or build this field in one piece",
+            "take the sign auto, or flood for an open mesh, or build this field in one piece",
             filled.conflicts));
     const SignCounts counts{filled.conflicts, filled.compared};
     if (filled.grids->distance->tree().leafCount() == 0) return {nullptr, {}, nullptr, counts};

@@ -8,6 +8,7 @@
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
+#include "tests/tools/gltf_triangle.h"
 #include "tests/tools/library.h"
 #include "tests/tools/program.h"
 
@@ -193,20 +194,12 @@ TEST_CASE("finished work is skipped by content, not by name or time") {
 
 TEST_CASE("a .gltf file with changed buffers is another mesh") {
     const fs::path library = emptyFolder("gltf"), output = emptyFolder("gltf_fields");
-    std::ofstream(library / "t.gltf") << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
-      "nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
-      "buffers":[{"uri":"t.bin","byteLength":36}],"bufferViews":[{"buffer":0,"byteLength":36}],
-      "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}]})";
-    const auto write = [&](float height) {
-        const float corners[9] = {0, 0, 0, 1, 0, 0, 0, height, 0};
-        std::ofstream(library / "t.bin", std::ios::binary)
-            .write(reinterpret_cast<const char*>(corners), sizeof corners);
-    };
-    write(1);
+    writeGltf(library, "t", 1, 1);
+    writeGltfTriangle(library, "t", 1);
     const Words words = batchWords(library, output, {"--sign", "flood"});
     CHECK(countOf(convertAll(words), "done") == 1);
     CHECK(countOf(convertAll(words), "skipped") == 1);
-    write(0.75f);
+    writeGltfTriangle(library, "t", 0.75f);
     CHECK(countOf(convertAll(words), "done") == 1);
 }
 
@@ -240,14 +233,15 @@ TEST_CASE("a bad mesh fails alone, and its record names the reason") {
     std::ofstream(library / "a/empty.obj");
     std::ofstream(library / "b/range.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 7\n";
     fs::create_symlink("absent.ply", library / "b/dangling.ply");
+    fs::create_symlink("loop.ply", library / "b/loop.ply");
     const Result r = run(batchWords(library, output));
     CHECK(r.status == 1);
     CHECK(r.errorLines() == 1);
-    CHECK(r.err.find("3 of 7 meshes failed") != std::string::npos);
+    CHECK(r.err.find("4 of 8 meshes failed") != std::string::npos);
     CHECK(r.err.find("empty.obj") != std::string::npos);
     const auto records = recordsIn(r.out);
     CHECK(countOf(records, "done") == 4);
-    for (const char* name : {"a/empty.obj", "b/range.obj", "b/dangling.ply"}) {
+    for (const char* name : {"a/empty.obj", "b/range.obj", "b/dangling.ply", "b/loop.ply"}) {
         CAPTURE(name);
         CHECK(records.at(name)["outcome"] == "failed");
         CHECK(records.at(name)["reason"] == "error");

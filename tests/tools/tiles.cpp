@@ -15,6 +15,7 @@
 #include "demos/shared/shapes.h"
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
+#include "tests/tools/gltf_triangle.h"
 #include "tests/tools/tile_builds.h"
 
 namespace bilayer::tiles_test {
@@ -107,9 +108,21 @@ TEST_CASE("a build that was killed continues with the missing tiles") {
             if (fs::exists(field)) times[field] = fs::last_write_time(field);
         }
     REQUIRE(!times.empty());
+    const fs::path work = scratch("killed_work");
+    fs::copy(folder / "work", work, fs::copy_options::recursive);
     built(words);
     for (const auto& [path, time] : times) CHECK(fs::last_write_time(path) == time);
-    CHECK(sameFields(merged(folder), inOnePiece(mesh, {"--resolution", "300", "--sign", "normals"})));
+    const LevelSet whole = inOnePiece(mesh, {"--resolution", "300", "--sign", "normals"});
+    CHECK(sameFields(merged(folder), whole));
+
+    // a run that is killed at its end leaves the manifest and the records
+    for (const bool isDamaged : {false, true}) {
+        fs::copy(work, folder / "work", fs::copy_options::recursive);
+        if (isDamaged) std::ofstream(times.begin()->first) << "damaged";
+        built(words);
+        CHECK(!fs::exists(folder / "work"));
+        CHECK(sameFields(merged(folder), whole));
+    }
 }
 
 TEST_CASE("one process at a time builds the tiles of a folder") {
@@ -186,7 +199,7 @@ TEST_CASE("memory is stated and kept, or the build is refused before its first t
     checkRefusal(withNormals(mesh, folder, "1x1x1", joined(size, {"--memory", "155"})), 1,
                  "the largest of 1 tiles needs about");
     CHECK(!fs::exists(folder / "tile_0_0_0.vdb"));
-    fs::remove_all(folder);
+    // a folder without tiles may get others
     const nlohmann::json manifest = built(withNormals(mesh, folder, "4x4x2", joined(size, {"--memory", "300"})));
     const double stated = manifest["sum"]["estimatedBytes"];
     CHECK(manifest["sum"]["peakRssBytes"].get<double>() < stated);
@@ -195,6 +208,34 @@ TEST_CASE("memory is stated and kept, or the build is refused before its first t
     writeMesh(object, shapes::sphere(1, 8));
     checkRefusal(withNormals(object, scratch("object"), "2x2x2", {"--resolution", "50", "--memory", "130"}), 1,
                  "reading it whole needs about");
+    // 30 nodes share 100,000 triangles
+    writeGltf(object.parent_path(), "memory", 100'000, 30);
+    std::ofstream(scratch("memory.bin"));
+    fs::resize_file(scratch("memory.bin"), 3'600'000);
+    checkRefusal(
+        withNormals(scratch("memory.gltf"), scratch("scene"), "2x2x2", {"--resolution", "50", "--memory", "400"}), 1,
+        "reading it whole needs about");
+}
+
+TEST_CASE("A .gltf file with changed buffers is another mesh, in tiles too") {
+    const fs::path mesh = scratch("triangle.gltf"), folder = scratch("triangle");
+    writeGltf(mesh.parent_path(), "triangle", 1, 1);
+    writeGltfTriangle(mesh.parent_path(), "triangle", 1);
+    const Words words = tiled(mesh, folder, "2x1x1", {"--resolution", "100", "--sign", "flood"});
+    built(words);
+    writeGltfTriangle(mesh.parent_path(), "triangle", 0.5f);
+    checkRefusal(words, 1, "holds tiles of another mesh or with other options");
+}
+
+TEST_CASE("Triangles of voxels whose signs are found again are those of a field in one piece") {
+    const Mesh ball = shapes::sphere(1, 3);
+    Mesh both = ball;
+    for (const glm::vec3& point : ball.points) both.points.push_back(point + glm::vec3(0.9f, 0.2f, 0.1f));
+    for (const glm::uvec3& t : ball.triangles) both.triangles.push_back(t + glm::uvec3(ball.points.size()));
+    const fs::path mesh = scratch("overlap.ply");
+    writeMesh(mesh, both);
+    for (const char* sign : {"auto", "winding"})
+        sameInTiles(mesh, "2x2x1", {"--resolution", "90", "--sign", sign, "--triangles"});
 }
 
 TEST_CASE("tiles refuse what needs the whole field, by name") {

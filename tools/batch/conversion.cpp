@@ -23,8 +23,8 @@
 #include "sdf/leaf/build_options.h"
 #include "sdf/leaf/build_size.h"
 #include "tools/batch/batch_folder.h"
-#include "tools/batch/mesh_file_hash.h"
 #include "tools/batch/thumbnail.h"
+#include "tools/mesh_file.h"
 
 namespace bilayer::tools {
 namespace {

@@ -24,7 +24,9 @@ constexpr std::array<std::string_view, 10> meshEndings{".obj", ".ply", ".stl", "
 
 bool isMesh(const fs::directory_entry& entry) {
     const std::string ending = detail::lowerEnding(entry.path());
-    return std::find(meshEndings.begin(), meshEndings.end(), ending) != meshEndings.end() && !entry.is_directory();
+    std::error_code ignored;  // of a link that leads nowhere: reading it reports why
+    return std::find(meshEndings.begin(), meshEndings.end(), ending) != meshEndings.end() &&
+           !entry.is_directory(ignored);
 }
 
 std::string meshName(const fs::path& file) {
@@ -53,7 +55,8 @@ std::vector<BatchMesh> meshesInTree(const fs::path& folder) {
         folders.pop_back();
         std::error_code error;
         for (fs::directory_iterator entry(current, error), end; !error && entry != end; entry.increment(error)) {
-            if (entry->is_directory(error) && !entry->is_symlink(error))
+            std::error_code ignored;
+            if (entry->is_directory(ignored) && !entry->is_symlink(ignored))
                 folders.push_back(entry->path());
             else if (isMesh(*entry))
                 meshes.push_back({entry->path(), entry->path().lexically_relative(folder).generic_string()});

@@ -67,9 +67,11 @@ Json summaryJson(const BatchSummary& summary, std::size_t damagedLines) {
 void reportBatch(const BatchFolder& folder, bool json) {
     const RecordList list = readRecords(folder.records());
     const BatchSummary summary = summaryOf(list.records);
+    if (json)
+        print(summaryJson(summary, list.damagedLines));
+    else
+        printText(folder.root(), summary, list.damagedLines);
     writeText(folder.root() / "report.html", reportPage(folder, list.records, summary));
-    if (json) return print(summaryJson(summary, list.damagedLines));
-    printText(folder.root(), summary, list.damagedLines);
 }
 
 }  // namespace bilayer::tools

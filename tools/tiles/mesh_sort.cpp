@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "sdf/base/stopwatch.h"
-#include "sdf/io/input_file.h"
 #include "sdf/leaf/build_options.h"
 #include "sdf/tiles/tile_sort.h"
+#include "tools/mesh_file.h"
 #include "tools/tiles/tile_plan.h"
 
 namespace bilayer::tools {
@@ -19,21 +19,9 @@ using namespace bilayer::detail;
 namespace {
 
 constexpr double bytesPerMib = 1 << 20;
-/// Memory to read a mesh whole, per byte of its file, and the program without it [bytes]. The largest factor is
-/// that of binary files.
-constexpr double bytesPerFileByte = 6, bytesOfReader = 120e6;
-/// The same for formats that are compressed, or of which an importer holds several forms. A 3MF file took 80 bytes.
-constexpr double bytesPerImportedByte = 100;
 /// Memory per triangle to orient a mesh, and to choose its sign by winding numbers [bytes]. Meshes of 1.2 and 1.4
 /// million triangles took 140 and 120.
 constexpr double bytesPerOriented = 250;
-
-double bytesPerByteOf(const std::filesystem::path& mesh) {
-    const std::string ending = lowerEnding(mesh);
-    for (const char* direct : {".obj", ".ply", ".stl", ".off", ".raw", ".gltf", ".glb"})
-        if (ending == direct) return bytesPerFileByte;
-    return bytesPerImportedByte;
-}
 
 }  // namespace
 
@@ -59,8 +47,7 @@ void MeshSort::run(const Json& identity, int round, const PlannedSigns* known) {
 
 // Reads the mesh whole if it fits, since its hash is then known.
 SignedSource MeshSort::open(int round) const {
-    requireInputFile(a_.mesh);
-    const double whole = double(std::filesystem::file_size(a_.mesh)) * bytesPerByteOf(a_.mesh) + bytesOfReader;
+    const double whole = bytesToRead(a_.mesh);
     try {
         if (whole <= budget_) {
             Mesh mesh = readMesh(a_.mesh);
@@ -73,7 +60,7 @@ SignedSource MeshSort::open(int round) const {
     }
     throw std::runtime_error(fmt::format(
         "{}: reading it whole needs about {:.0f} MiB, and {:.0f} MiB are given; a binary STL file, or a binary PLY "
-        "file of triangles with float coordinates, is not read whole",
+        "file of nothing but vertices with float coordinates and triangles, is not read whole",
         a_.mesh.string(), whole / bytesPerMib, budget_ / bytesPerMib));
 }
 

@@ -61,6 +61,17 @@ void TileFolder::remove(const glm::ivec3& tile) const {
     for (const auto& path : {record(tile), field(tile), cells(tile)}) std::filesystem::remove(path);
 }
 
+bool TileFolder::hasTiles() const {
+    const auto holds = [](const std::filesystem::path& folder, auto&& accept) {
+        std::error_code ignored;
+        for (const auto& entry : std::filesystem::directory_iterator(folder, ignored))
+            if (accept(entry.path())) return true;
+        return false;
+    };
+    return holds(root_, [](const auto& path) { return path.filename().string().starts_with("tile_"); }) ||
+           holds(work(), [](const auto& path) { return path.extension() == ".record"; });
+}
+
 void TileFolder::clean() const {
     std::error_code ignored;
     std::filesystem::remove_all(work(), ignored);

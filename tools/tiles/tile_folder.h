@@ -55,6 +55,8 @@ class TileFolder {
     void removeGrowth() const;
     /// Removes the files of a tile and its record.
     void remove(const glm::ivec3& tile) const;
+    /// Returns whether there is any tile, or the record of one.
+    bool hasTiles() const;
     /// Removes the folder `work`.
     void clean() const;
 

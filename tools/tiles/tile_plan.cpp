@@ -35,6 +35,8 @@ Json bandOf(const openvdb::FloatGrid& grid) {
 
 // What each rank has read and written, and what other ranks wrote of that.
 Json loadOfRanks(const std::vector<Json>& records, const Json& plan, const Json& sorting, int count) {
+    // a run with more ranks may have been killed
+    for (const Json& record : records) count = std::max(count, record.at("rank").get<int>() + 1);
     Json ranks = Json::array();
     for (int rank = 0; rank < count; ++rank) {
         std::uint64_t tiles = 0, read = 0, written = 0, fromOthers = rank > 0 ? recordBytes(plan) : 0;

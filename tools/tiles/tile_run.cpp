@@ -22,6 +22,7 @@
 #include "sdf/io/content_hash.h"
 #include "sdf/tiles/tile_signs.h"
 #include "sdf/tiles/tile_sort.h"
+#include "tools/mesh_file.h"
 #include "tools/tiles/column_files.h"
 #include "tools/tiles/flood_run.h"
 #include "tools/tiles/mesh_sort.h"
@@ -106,13 +107,11 @@ class TileRun {
     // Plans the field, or resumes the existing plan. Afterwards there is the manifest of a finished field, or a plan
     // and the records of exactly those tiles that are intact.
     void prepare() {
-        identity_ = identityOf(a_, counts_, fileHash(a_.mesh));
+        identity_ = identityOf(a_, counts_, hex(meshFileHash(a_.mesh)));
         if (std::filesystem::exists(folder_.manifest())) {
             requireSame(readJson(folder_.manifest()));
             if (isFinished()) return;
-        } else if (std::filesystem::exists(folder_.plan())) {
-            resume();
-        } else {
+        } else if (!resume()) {
             sort().run(identity_, 0);
         }
         const TilePlan plan(readRecord(folder_.plan()));
@@ -125,9 +124,14 @@ class TileRun {
                 "{}: holds tiles of another mesh or with other options: choose another folder", a_.output.string()));
     }
 
-    // Sorts the triangles again if some that are needed are damaged.
-    void resume() {
+    // Returns whether there is a plan to go on with. Sorts the triangles again if some that are needed are damaged.
+    bool resume() {
+        if (!std::filesystem::exists(folder_.plan())) return false;
         const Json made = readPlanOfKilledRun(folder_);
+        if (made.at("field") != identity_ && !folder_.hasTiles()) {
+            folder_.clean();
+            return false;
+        }
         requireSame(made);
         const TilePlan plan(made);
         const Tiling tiling = tilingOf(plan);
@@ -139,9 +143,9 @@ class TileRun {
             if (!isDone || plan.signs().needSums() || plan.signs().areByFlood())
                 isSorted = isSorted && hasTileTriangles(folder_.triangles(place), plan.loads()[tile]);
         }
-        if (isSorted) return;
         const PlannedSigns signs = plan.signs();
-        sort().run(identity_, signs.round, &signs);
+        if (!isSorted) sort().run(identity_, signs.round, &signs);
+        return true;
     }
 
     // Also sets the options of the tiles.
@@ -157,9 +161,13 @@ class TileRun {
     bool isFinished() {
         const Json manifest = readJson(folder_.manifest()), records = manifest.at("tiles");
         const auto intact = [&](const Json& record) { return isIntact(folder_, record); };
-        if (std::all_of(records.begin(), records.end(), intact)) return true;
+        if (std::all_of(records.begin(), records.end(), intact)) {
+            folder_.clean();  // a run that was killed at its end has not done so
+            return true;
+        }
         const PlannedSigns signs = plannedSigns(manifest.at("signs"));
         folder_.create();
+        folder_.removeRecords();
         for (const Json& record : records)
             if (intact(record)) writeRecord(folder_.record(placeOf(record)), record);
         sort().run(identity_, signs.round, &signs);
