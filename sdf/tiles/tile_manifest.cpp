@@ -5,14 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <glm/vector_relational.hpp>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string_view>
 
 #include "sdf/base/quoted_text.h"
 #include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
+#include "sdf/io/mapped_file.h"
 
 namespace bilayer::detail {
 namespace {
@@ -115,6 +116,16 @@ void HashedFile::requireIntact() const {
             "{}: is missing or damaged: repeat `bilayer build --tiles`, which builds it again", path.string()));
 }
 
+std::string withHash(std::string text) {
+    constexpr std::string_view entry = "\"hash\": \"", end = "\"\n}\n";
+    constexpr std::size_t digits = 16;
+    if (text.size() < entry.size() + digits + end.size() || !text.ends_with(end)) return text;
+    const std::size_t at = text.size() - end.size() - digits;
+    if (text.compare(at - entry.size(), entry.size(), entry) != 0) return text;
+    text.replace(at, digits, digits, '0');
+    return text.replace(at, digits, fmt::format("{:016x}", contentHash(text)));
+}
+
 TileManifest readTileManifest(const std::filesystem::path& folder) {
     const std::filesystem::path path = folder / "manifest.json";
     if (!std::filesystem::exists(path))
@@ -126,8 +137,11 @@ TileManifest readTileManifest(const std::filesystem::path& folder) {
     };
     TileManifest manifest;
     try {
-        std::ifstream stream(path, std::ios::binary);
-        const Json json = Json::parse(stream);
+        const MappedFile file(path);
+        const std::string text(file.bytes());
+        if (withHash(text) != text)
+            throw std::runtime_error("its bytes have another hash: remove it, and repeat `bilayer build --tiles`");
+        const Json json = Json::parse(text);
         manifest.counts = triple(json.at("field").at("tiles"));
         const Json& origin = json.at("mesh").at("origin");
         manifest.origin = {origin.at(0).get<double>(), origin.at(1).get<double>(), origin.at(2).get<double>()};

@@ -43,7 +43,12 @@ struct TileManifest {
     }
 };
 
-/// Reads manifest.json of a folder. Throws std::runtime_error that names the file if it is missing or damaged.
+/// Returns the text of a manifest with the hash of the text, in which the digits of the hash are zeros, in its last
+/// entry, "hash". A text without this entry is returned as it is.
+std::string withHash(std::string text);
+
+/// Reads manifest.json of a folder. Its hash must be right; one that was made by hand needs none. Throws
+/// std::runtime_error that names the file if it is missing or damaged.
 TileManifest readTileManifest(const std::filesystem::path& folder);
 
 }  // namespace bilayer::detail

@@ -13,6 +13,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "tests/support/random.h"
 #include "tests/support/same_fields.h"
 #include "tests/support/support.h"
 #include "tests/tools/gltf_triangle.h"
@@ -170,6 +171,20 @@ TEST_CASE("a tile with a wrong byte is found and built again") {
     CHECK(again["tiles"][0] == manifest["tiles"][0]);
     // nothing is missing: nothing is built
     CHECK(built(words)["tiles"] == again["tiles"]);
+
+    const std::string text = contents(folder / "manifest.json");
+    const unsigned start = seed();
+    CAPTURE(start);
+    Random random(start);
+    for (int i = 0; i < 20; ++i) {
+        std::string changed = text;
+        const auto at = std::size_t(random(0, double(text.find("\n \"hash\""))));
+        changed[at] = char(changed[at] ^ 1);
+        std::ofstream(folder / "manifest.json") << changed;
+        CAPTURE(at);
+        checkRefusal({"info", folder.string()}, 1, "manifest.json: is no manifest of tiles");
+        checkRefusal(words, 1, "manifest.json: is no manifest of tiles");
+    }
 }
 
 TEST_CASE("A folder of tiles is described and queried like a file") {

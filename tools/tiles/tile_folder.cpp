@@ -16,6 +16,7 @@
 #include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
 #include "sdf/tiles/hashed_record.h"
+#include "sdf/tiles/tile_manifest.h"
 
 namespace bilayer::tools {
 
@@ -88,8 +89,9 @@ FolderLock::~FolderLock() {
     if (file_ >= 0) ::close(file_);
 }
 
-void writeJson(const std::filesystem::path& path, const Json& json) {
-    writeText(path, json.dump(1) + "\n");
+void writeManifest(const std::filesystem::path& path, Json manifest) {
+    manifest["hash"] = hex(0);
+    writeText(path, withHash(manifest.dump(1) + "\n"));
 }
 
 Json readJson(const std::filesystem::path& path) {

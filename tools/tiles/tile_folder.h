@@ -84,8 +84,8 @@ class FolderLock {
     int file_;
 };
 
-/// Writes a file whole or not at all. Throws std::runtime_error that names the file.
-void writeJson(const std::filesystem::path& path, const Json& json);
+/// Writes a manifest with its hash, whole or not at all. Throws std::runtime_error that names the file.
+void writeManifest(const std::filesystem::path& path, Json manifest);
 
 /// Throws std::runtime_error that names the file if it cannot be read or is no JSON.
 Json readJson(const std::filesystem::path& path);

@@ -20,6 +20,7 @@
 #include "sdf/base/usable_memory.h"
 #include "sdf/grid/vdb_grids.h"
 #include "sdf/io/content_hash.h"
+#include "sdf/tiles/tile_manifest.h"
 #include "sdf/tiles/tile_signs.h"
 #include "sdf/tiles/tile_sort.h"
 #include "tools/mesh_file.h"
@@ -109,6 +110,7 @@ class TileRun {
     void prepare() {
         identity_ = identityOf(a_, counts_, hex(meshFileHash(a_.mesh)));
         if (std::filesystem::exists(folder_.manifest())) {
+            readTileManifest(folder_.root());  // may throw
             requireSame(readJson(folder_.manifest()));
             if (isFinished()) return;
         } else if (!resume()) {
@@ -330,7 +332,7 @@ class TileRun {
         if (!plan.signs().areByFlood()) joinSides(records, counts_);
         Json manifest = plan.manifest(records, ranks_.count);
         manifest["sum"]["estimatedBytes"] = std::uint64_t(std::max(largestNeed(plan, tiling), bytesOfRecords(tiling)));
-        writeJson(folder_.manifest(), manifest);
+        writeManifest(folder_.manifest(), std::move(manifest));
         folder_.clean();
     }
 
