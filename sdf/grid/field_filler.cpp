@@ -63,14 +63,6 @@ void makePositive(openvdb::FloatGrid& distance) {
     });
 }
 
-// Inactive voxels have no triangle, whichever way their signs were found.
-void clearInactive(openvdb::Int32Tree& triangles) {
-    openvdb::tree::LeafManager<openvdb::Int32Tree> leaves(triangles);
-    leaves.foreach ([&](auto& leaf, std::size_t) {
-        for (auto voxel = leaf.beginValueOff(); voxel; ++voxel) voxel.setValue(triangles.background());
-    });
-}
-
 // Maximum distance of a corrected voxel from the surface [m].
 float repairLimit(const BuildOptions& options) {
     return enclosesSurface(options) ? options.voxelSize : 0;
@@ -258,9 +250,7 @@ std::shared_ptr<Grids> FieldFiller::grids() {
     auto grids = std::make_shared<Grids>();
     grids->distance = distance_;
     if (triangle_) {
-        // Voxels that were active for the wider of the two widths may lie outside the band on their final side.
-        triangle_->tree().topologyIntersection(distance_->tree());
-        clearInactive(triangle_->tree());
+        keepActive(triangle_->tree(), distance_->tree());
         triangle_->setTransform(distance_->transformPtr());
         grids->triangle = triangle_;
     }

@@ -2,6 +2,7 @@
 #include "sdf/grid/field_part.h"
 
 #include <openvdb/tools/Prune.h>
+#include <openvdb/tree/LeafManager.h>
 
 #include <cmath>
 
@@ -164,6 +165,14 @@ void renumber(openvdb::Int32Tree& tree, const FieldPart& part) {
     for (auto leaf = tree.beginLeaf(); leaf; ++leaf)
         for (auto voxel = leaf->beginValueOn(); voxel; ++voxel)
             if (*voxel >= 0) voxel.setValue(std::int32_t(part.triangles[std::size_t(*voxel)]));
+}
+
+void keepActive(openvdb::Int32Tree& triangles, const openvdb::FloatTree& distances) {
+    triangles.topologyIntersection(distances);
+    openvdb::tree::LeafManager<openvdb::Int32Tree> leaves(triangles);
+    leaves.foreach ([&](auto& leaf, std::size_t) {
+        for (auto voxel = leaf.beginValueOff(); voxel; ++voxel) voxel.setValue(triangles.background());
+    });
 }
 
 }  // namespace bilayer::detail

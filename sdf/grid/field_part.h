@@ -79,4 +79,8 @@ void trimToPart(openvdb::FloatTree& tree, const FieldPart& part);
 /// Replaces the numbers of triangles by those in the whole mesh.
 void renumber(openvdb::Int32Tree& tree, const FieldPart& part);
 
+/// Removes the triangles of voxels without an active distance. These were active for the wider of the two widths of the
+/// band, and lie outside of it on their final side.
+void keepActive(openvdb::Int32Tree& triangles, const openvdb::FloatTree& distances);
+
 }  // namespace bilayer::detail

@@ -199,8 +199,7 @@ BuiltTile FloodTile::signedTile() {
         built.inside = sides.inside;
         if (!sides.inside || !sides.outside) return built;
     }
-    if (grids_->triangle)
-        openvdb::ConstPtrCast<openvdb::Int32Grid>(grids_->triangle)->tree().topologyIntersection(*tree);
+    if (grids_->triangle) keepActive(openvdb::ConstPtrCast<openvdb::Int32Grid>(grids_->triangle)->tree(), *tree);
     built.grids = grids_;
     built.border = border;
     return built;
