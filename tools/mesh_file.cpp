@@ -78,12 +78,12 @@ double bytesToRead(const std::filesystem::path& path) {
         if (lowerEnding(path) == direct) need = size * bytesPerFileByte;
     if (isGltf(path))
         visitScene(path, [&](const json& scene, const std::vector<Bytes>& buffers) {
-            for (const Bytes& bytes : buffers) need += double(bytes.size()) * bytesPerFileByte;
-            double triangles = 0;
+            double held = 0, triangles = 0;
+            for (const Bytes& bytes : buffers) held += double(bytes.size());  // in the file, or next to it
             for (const json& node : scene.at("nodes"))
                 if (node.contains("mesh"))
                     triangles += trianglesOf(scene, scene.at("meshes").at(node["mesh"].get<std::size_t>()));
-            need = std::max(need, triangles * bytesPerSceneTriangle);
+            need = std::max({need, held * bytesPerFileByte, triangles * bytesPerSceneTriangle});
         });
     return need + bytesOfReader;
 }

@@ -288,7 +288,7 @@ TEST_CASE("The contacts of a step have the approach of its motion, on the points
         collide(lying, tilting, {.margin = margin}, contacts);
         int ofSlab = 0, ofBrick = 0;
         for (const Contact& contact : contacts) {
-            if (contact.distance > 0) continue;  // the path of a point beside an edge may pass it
+            if (contact.distance > 0) continue;  // the path of a point next to an edge may miss it
             const glm::vec3 moved = glm::cross(rotation, contact.position - tilting.pose.position);
             const float expected = fraction > 1 ? std::max(glm::dot(moved, contact.normal), 0.f) : 0;
             CHECK(contact.approach == Approx(expected).margin(0.05 * h));
