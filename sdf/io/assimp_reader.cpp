@@ -165,13 +165,17 @@ Polygons readByAssimp(const std::filesystem::path& path) {
     constexpr unsigned noFurtherStep = 0;
     const aiScene* scene = importer.ReadFile(path.string(), noFurtherStep);
     Polygons polygons;
-    if (scene) polygons = AssimpScene(*scene).read();
+    if (scene) polygons = polygonsOf(*scene);
     if (polygons.corners.empty() && isZip64(path))
         throw std::runtime_error("is a ZIP64 archive, of which the importer reads nothing; save it without ZIP64");
     if (scene) return polygons;
     // an exception carries more than its text
     if (importer.GetException()) std::rethrow_exception(importer.GetException());
     throw std::runtime_error(importer.GetErrorString());
+}
+
+Polygons polygonsOf(const aiScene& scene) {
+    return AssimpScene(scene).read();
 }
 
 }  // namespace bilayer::detail

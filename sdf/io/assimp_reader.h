@@ -7,6 +7,8 @@
 
 #include "sdf/io/polygons.h"
 
+struct aiScene;
+
 namespace bilayer::detail {
 
 /// Reads all meshes of a file under the transforms of their nodes, with untriangulated faces. Collada files keep their
@@ -18,5 +20,8 @@ namespace bilayer::detail {
 /// Many importers of Assimp 5.2 crash or hang on damaged files. Call this in a child process (see readScene()), which
 /// also frees the memory that Assimp has allocated.
 Polygons readByAssimp(const std::filesystem::path& path);
+
+/// The same for a scene that Assimp has read, whose indices may be wrong.
+Polygons polygonsOf(const aiScene& scene);
 
 }  // namespace bilayer::detail

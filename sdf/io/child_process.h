@@ -45,6 +45,8 @@ class ChildProcess {
 
     /// Sends bytes to the caller.
     using Send = std::function<void(const void* bytes, std::size_t count)>;
+    /// Receives bytes that were sent. Throws ChildFailure if there are fewer.
+    using Receive = std::function<void(void* bytes, std::size_t count)>;
     /// An exception from this function ends the child without an answer.
     using Work = std::function<void(const Send&)>;
 

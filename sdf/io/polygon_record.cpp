@@ -6,6 +6,8 @@
 #include <new>
 #include <numeric>
 
+#include "sdf/base/quoted_text.h"
+
 namespace bilayer::detail {
 namespace {
 
@@ -24,24 +26,25 @@ void sendText(const ChildProcess::Send& send, const std::string& text) {
     send(text.data(), count);
 }
 
-std::string receiveText(ChildProcess& child) {
+std::string receiveText(const ChildProcess::Receive& receive) {
     std::uint64_t count = 0;
-    child.receive(&count, sizeof count);
+    receive(&count, sizeof count);
     if (count > maxTextBytes) throw ChildFailure("gave a damaged answer");
     std::string text(count, ' ');
-    child.receive(text.data(), count);
-    return text;
+    receive(text.data(), count);
+    return oneLine(text);
 }
 
 template <class T>
-void receiveAll(ChildProcess& child, std::vector<T>& items, std::uint64_t count) {
+void receiveAll(const ChildProcess::Receive& receive, std::vector<T>& items, std::uint64_t count) {
     items.resize(count);
-    child.receive(items.data(), count * sizeof(T));
+    receive(items.data(), count * sizeof(T));
 }
 
 bool fits(const RecordHeader& header, std::size_t byteLimit) {
-    return header.notes <= maxNotes && header.points <= byteLimit / sizeof(glm::dvec3) &&
-           header.corners <= byteLimit / sizeof(unsigned) && header.sizes <= byteLimit / sizeof(unsigned);
+    constexpr std::uint64_t maxCount = std::uint64_t(1) << 40;  // larger counts could overflow the sum
+    return header.notes <= maxNotes && std::max({header.points, header.corners, header.sizes}) <= maxCount &&
+           header.points * sizeof(glm::dvec3) + (header.corners + header.sizes) * sizeof(unsigned) <= byteLimit;
 }
 
 bool consistent(const Polygons& p) {
@@ -76,17 +79,20 @@ void sendOutOfMemory(const ChildProcess::Send& send) {
     send(&header, sizeof header);
 }
 
-Polygons receivePolygons(ChildProcess& child, std::size_t byteLimit) {
+Polygons receivePolygons(const ChildProcess::Receive& receive, std::size_t byteLimit) {
     RecordHeader header{};
-    child.receive(&header, sizeof header);
-    if (header.answer == ofError) throw std::runtime_error(receiveText(child));
+    receive(&header, sizeof header);
+    if (header.answer == ofError) {
+        const std::string why = receiveText(receive);
+        throw std::runtime_error(why.empty() ? "cannot be read" : why);
+    }
     if (header.answer == ofExhaustedMemory) throw std::bad_alloc();
     if (header.answer != ofPolygons || !fits(header, byteLimit)) throw ChildFailure("gave a damaged answer");
     Polygons polygons;
-    receiveAll(child, polygons.points, header.points);
-    receiveAll(child, polygons.corners, header.corners);
-    receiveAll(child, polygons.sizes, header.sizes);
-    for (std::uint64_t i = 0; i < header.notes; ++i) polygons.notes.push_back(receiveText(child));
+    receiveAll(receive, polygons.points, header.points);
+    receiveAll(receive, polygons.corners, header.corners);
+    receiveAll(receive, polygons.sizes, header.sizes);
+    for (std::uint64_t i = 0; i < header.notes; ++i) polygons.notes.push_back(receiveText(receive));
     if (!consistent(polygons)) throw ChildFailure("gave a damaged answer");
     return polygons;
 }

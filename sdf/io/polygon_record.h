@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Serialises polygons for transfer from one process to another; internal.
-// Tested by tests/sdf/child_process.cpp.
+// Tested by tests/sdf/child_process.cpp and tests/fuzz/scene_check.cpp.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ void sendOutOfMemory(const ChildProcess::Send& send);
 
 /// Receives polygons without trusting the data. Throws ChildFailure if the counts exceed `byteLimit` or are
 /// inconsistent, or if a corner refers to no point. Throws std::runtime_error with the error text if one was sent,
-/// and std::bad_alloc if memory was exhausted.
-Polygons receivePolygons(ChildProcess& child, std::size_t byteLimit);
+/// and std::bad_alloc if memory was exhausted. The error text and the notes are one line each (see oneLine()).
+Polygons receivePolygons(const ChildProcess::Receive& receive, std::size_t byteLimit);
 
 }  // namespace bilayer::detail

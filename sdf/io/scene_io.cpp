@@ -9,7 +9,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "sdf/base/quoted_text.h"
 #include "sdf/base/usable_memory.h"
 #include "sdf/io/assimp_reader.h"
 #include "sdf/io/input_file.h"
@@ -54,8 +53,7 @@ void readInChild(const std::filesystem::path& path, std::size_t memory, std::opt
     } catch (const std::length_error&) {  // from a container larger than the address space
         return tooLarge();
     } catch (const std::runtime_error& error) {
-        const std::string why = oneLine(error.what());
-        return sendError(send, why.empty() ? "cannot be read" : why);
+        return sendError(send, error.what());
     } catch (const std::exception&) {  // a failed check within a library, whose text is not about the file
         return sendError(send, "the importer cannot make sense of it; it may be damaged");
     }
@@ -83,7 +81,8 @@ Polygons readScene(const std::filesystem::path& path, const ChildLimits& limits)
     try {
         ChildProcess child(limits,
                            [&](const ChildProcess::Send& send) { readInChild(path, limits.memory, remaining, send); });
-        Polygons polygons = receivePolygons(child, limits.memory);
+        Polygons polygons =
+            receivePolygons([&](void* bytes, std::size_t count) { child.receive(bytes, count); }, limits.memory);
         if (remaining && polygons.corners.empty()) polygons.notes.push_back(memoryNote(*remaining));
         return polygons;
     } catch (const ChildFailure& failure) {

@@ -35,11 +35,6 @@ int answerAnew() {
     return answer(device.impl(), buildProgram(device.impl(), source, options));
 }
 
-std::string contents(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 void overwrite(const std::filesystem::path& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary) << bytes;
 }
@@ -124,7 +119,7 @@ TEST_CASE("damaged files in the cache are compiled anew and replaced") {
     cacheIn(bilayer::test::scratch("damage"));
     const std::filesystem::path path = cachedProgram(openDevice().info(), source, options);
     CHECK(answerAnew() == 42);
-    const std::string whole = contents(path);
+    const std::string whole = test::contentsOf(path);
     REQUIRE(whole.size() > 100);
     std::string flipped = whole;
     flipped[whole.size() / 2] = char(flipped[whole.size() / 2] ^ 1);
@@ -135,7 +130,7 @@ TEST_CASE("damaged files in the cache are compiled anew and replaced") {
     overwrite(path, damaged);
     CHECK(answerAnew() == 42);
     // replaced by one that is used the next time; its size may differ, since PoCL's binaries are not reproducible
-    CHECK(contents(path) != damaged);
+    CHECK(test::contentsOf(path) != damaged);
     const auto written = std::filesystem::last_write_time(path);
     CHECK(answerAnew() == 42);
     CHECK(std::filesystem::last_write_time(path) == written);

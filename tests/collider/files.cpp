@@ -50,11 +50,6 @@ std::vector<Contact> contacts(const Collider& a, const Collider& b) {
     return found;
 }
 
-std::string bytesOf(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
 // What a file answers: as many contacts, the same distances, sides and mass.
 struct Answers {
     std::size_t contacts;
@@ -258,7 +253,7 @@ TEST_CASE("lengths in a file take no more memory than the file explains, whateve
     const auto path = scratch("lengths.vdb");
     writeVdb(path, stored());
     constexpr std::size_t sealSize = 23, headSize = 3000;
-    std::string whole = bytesOf(path);
+    std::string whole = test::contentsOf(path);
     whole.resize(whole.size() - sealSize);  // like files of other programs
     std::ofstream(path, std::ios::binary) << whole;
     askAll(path, contacts(Collider(stored()), Collider(stored())).size());

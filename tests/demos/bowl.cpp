@@ -22,8 +22,7 @@ TEST_CASE(
     };
     CHECK(play(0.5) == 3);  // they are still falling
     REQUIRE(play(30) == 0);
-    std::ifstream file(log);
-    const std::string table{std::istreambuf_iterator<char>(file), {}};
+    const std::string table = test::contentsOf(log);
     for (const char* row : {"build the fields", "simulated", "a step", "contacts a step", "deepest penetration"})
         CHECK(table.find(row) != std::string::npos);
     CHECK(std::filesystem::file_size(out / "bowl.html") > 500'000);

@@ -49,8 +49,7 @@ TEST_CASE("a plot is written to a file, or the file is named") {
     const std::vector<demo::Panel> panels{{"t", "x", "y", {64, 128}, {{"a", {64, 128}, {1, 4}}}}};
     const auto path = test::scratch("plot.svg");
     demo::writeSvg(path, panels);
-    std::ifstream file(path);
-    CHECK(std::string(std::istreambuf_iterator<char>(file), {}) == demo::svg(panels));
+    CHECK(test::contentsOf(path) == demo::svg(panels));
     CHECK_THROWS_WITH(demo::writeSvg("/nonexistent/plot.svg", panels), Catch::Contains("/nonexistent/plot.svg"));
     CHECK_THROWS_AS(demo::svg({{"t", "x", "y", {}, {}}}), std::invalid_argument);
     CHECK_THROWS_AS(demo::svg({}), std::invalid_argument);

@@ -13,11 +13,6 @@
 namespace bilayer::recording_test {
 namespace {
 
-std::string textOf(const std::filesystem::path& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
 // The data in a page.
 nlohmann::json dataOf(const std::string& html) {
     const std::string start = "id=\"data\">";
@@ -79,7 +74,7 @@ TEST_CASE("a recording is one file that asks the network for nothing") {
     for (int i = 0; i < 10; ++i) recording.frame(0.1 * i, std::vector<Pose>{{{0, 0, 0.1f * float(i)}}});
     const auto path = test::scratch("ball.html");
     recording.write(path);
-    const std::string html = textOf(path);
+    const std::string html = test::contentsOf(path);
     CHECK(html.size() > 500'000);  // three.js is included
     CHECK(html.find("OrbitControls") != std::string::npos);
     CHECK(html.find("</script> title") == std::string::npos);  // a title cannot terminate the script that holds it
@@ -109,7 +104,7 @@ TEST_CASE("surfaces that change are kept, each in its frame") {
         recording.frame(0.1 * double(i), std::vector<Pose>(1), std::vector<Mesh>{surfaces[i]});
     const auto path = test::scratch("changing.html");
     recording.write(path);
-    const nlohmann::json body = dataOf(textOf(path)).at("changing").at(0);
+    const nlohmann::json body = dataOf(test::contentsOf(path)).at("changing").at(0);
     CHECK(body.at("clear") == true);
     REQUIRE(body.at("frames").size() == surfaces.size());
     for (std::size_t i = 0; i < surfaces.size(); ++i) {
@@ -131,7 +126,7 @@ TEST_CASE("surfaces that change are kept, each in its frame") {
     still.addBody(still.addMesh(shapes::sphere(0.1f, 1)), {});
     still.frame(0, std::vector<Pose>(1));
     still.write(path);
-    CHECK(!dataOf(textOf(path)).contains("changing"));
+    CHECK(!dataOf(test::contentsOf(path)).contains("changing"));
 }
 
 TEST_CASE("a frame has a surface for each body that changes") {

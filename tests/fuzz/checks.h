@@ -31,7 +31,8 @@ inline void require(bool holds, const std::string& what) {
     if (!holds) throw WrongAnswer(what);
 }
 
-/// Throws WrongAnswer if the text of an error is not one line of printable characters, or longer than 1000 bytes.
+/// Throws WrongAnswer if the text of an error is not one line of printable characters, longer than 1000 bytes, or in
+/// words of a library's insides.
 void requirePlainError(const std::string& text);
 
 /// A check, and inputs to start from.
@@ -52,6 +53,10 @@ void checkStl(Bytes file);
 void checkOff(Bytes file);
 void checkRaw(Bytes file);
 void checkGltf(Bytes file);
+/// A file in one of Assimp's formats, which the first byte chooses.
+void checkScenes(Bytes file);
+/// The conversion of a structured scene of Assimp's, and edited answers of the process that reads it.
+void checkSceneParts(Bytes recipe);
 /// Reports on a structured mesh against counts over all edges, and against the same mesh in another order.
 void checkInspect(Bytes recipe);
 /// Exact and pseudonormal fields of a structured mesh against distances in double precision and winding numbers.

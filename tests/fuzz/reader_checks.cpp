@@ -1,22 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "sdf/io/mesh_readers.h"
 #include "sdf/io/polygons.h"
 #include "sdf/io/read_gltf.h"
+#include "sdf/io/scene_io.h"
 #include "tests/fuzz/checks.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/support.h"
 
 namespace bilayer::test {
 namespace {
 
 constexpr std::size_t maxErrorBytes = 1000;  // [bytes] without the path: readers quote at most some words of a file
+// words of libraries that say nothing about a file
+constexpr const char* jargon[] = {"std::", "::_M_", "basic_string", "stoi", "stol", "exception", "damaged answer"};
 
 using Reader = Mesh (*)(const std::filesystem::path&, ReadReport&);
 
@@ -82,6 +88,11 @@ void checkReader(Bytes file, const char* name, Reader read) {
     checkWritten(mesh);
 }
 
+Mesh readShortly(const std::filesystem::path& path, ReadReport& report) {
+    constexpr detail::ChildLimits limits{std::chrono::seconds(1), std::size_t(1) << 30};
+    return detail::assembled(detail::readScene(path, limits), path, report);
+}
+
 }  // namespace
 
 void requirePlainError(const std::string& text) {
@@ -89,6 +100,8 @@ void requirePlainError(const std::string& text) {
     require(text.size() <= maxErrorBytes, "an error is too long: " + text);
     for (const char c : text)
         require(static_cast<unsigned char>(c) >= ' ' && c != '\x7f', "an error has control characters: " + text);
+    for (const char* word : jargon)
+        require(text.find(word) == std::string::npos, "an error is not in plain words: " + text);
 }
 
 void checkObj(Bytes file) {
@@ -129,6 +142,22 @@ void checkGltf(Bytes file) {
         return;
     }
     requireMesh(mesh);
+}
+
+void checkScenes(Bytes file) {
+    static const std::vector<SceneFile> formats = sceneFiles();
+    if (file.empty()) return;
+    const unsigned format = file[0] % (formats.size() + 1);
+    std::string bytes(file.begin() + 1, file.end());
+    std::filesystem::path name = "fuzz.3mf";
+    if (format < formats.size()) {
+        name = "fuzz" + std::filesystem::path(formats[format].name).extension().string();
+    } else {  // the model within an archive
+        std::vector<SceneFile> parts = parts3mf();
+        parts.back().bytes = bytes;
+        bytes = zip(parts);
+    }
+    checkReader({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, name.c_str(), readShortly);
 }
 
 }  // namespace bilayer::test

@@ -23,10 +23,8 @@ std::vector<std::string> inputsOf(const FuzzCheck& check) {
     std::vector<std::string> inputs = check.seeds();
     const std::filesystem::path folder = std::filesystem::path(BILAYER_CORPUS) / check.name;
     if (std::filesystem::exists(folder))
-        for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-            std::ifstream file(entry.path(), std::ios::binary);
-            inputs.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
-        }
+        for (const auto& entry : std::filesystem::directory_iterator(folder))
+            inputs.push_back(contentsOf(entry.path()));
     return inputs;
 }
 
@@ -81,6 +79,14 @@ TEST_CASE("damaged mesh files are read or refused in plain words, and what is re
 
 TEST_CASE("damaged glTF scenes are read or refused") {
     replay("gltf", 1000);
+}
+
+TEST_CASE("damaged files of scenes are read or refused in plain words") {
+    replay("scenes", 800);
+}
+
+TEST_CASE("scenes are converted as a count over their nodes says, and edited answers of importers are refused") {
+    replay("scene_parts", 1000);
 }
 
 TEST_CASE("reports on structured meshes have the counts of all edges, in any order of triangles") {

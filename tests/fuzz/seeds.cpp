@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -16,17 +14,13 @@
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "tests/fuzz/checks.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/support.h"
 
 namespace bilayer::test {
 namespace {
 
 using Seeds = std::vector<std::string>;
-
-std::string contentsOf(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
 
 std::string written(const char* name, const Mesh& mesh) {
     const std::filesystem::path path = scratch(name);
@@ -169,6 +163,14 @@ Seeds gltfSeeds() {
     return {gltfText(true), triangleGlb(), skinnedGlb()};
 }
 
+/// The first byte is the number of the format; see checkScenes().
+Seeds sceneSeeds() {
+    Seeds seeds;
+    for (const SceneFile& file : sceneFiles()) seeds.push_back(char(seeds.size()) + file.bytes);
+    seeds.push_back(char(seeds.size()) + parts3mf().back().bytes);
+    return seeds;
+}
+
 /// A dense array of distances, clamped to the band, as other programs write it.
 openvdb::FloatGrid::Ptr denseGrid(const LevelSet& levelSet) {
     const openvdb::FloatGrid::Ptr grid = levelSet.grids().distance->deepCopy();
@@ -258,6 +260,8 @@ const std::vector<FuzzCheck>& fuzzChecks() {
           "18446744073709551615",
           "1e999",
           "-1"}},
+        {"scenes", 8000, checkScenes, sceneSeeds},
+        {"scene_parts", 300, checkSceneParts, recipeSeeds},
         {"build", 200, checkBuild, recipeSeeds},
         {"inspect", 200, checkInspect, recipeSeeds},
         {"vdb",

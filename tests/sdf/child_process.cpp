@@ -73,9 +73,13 @@ void reapAll(int) {
     errno = error;
 }
 
+Polygons receivedFrom(ChildProcess& child, std::size_t byteLimit = std::size_t(1) << 30) {
+    return receivePolygons([&](void* bytes, std::size_t count) { child.receive(bytes, count); }, byteLimit);
+}
+
 Polygons throughPipe(const Polygons& polygons) {
     ChildProcess child(ample, [&](const ChildProcess::Send& send) { sendPolygons(send, polygons); });
-    return receivePolygons(child, std::size_t(1) << 30);
+    return receivedFrom(child);
 }
 
 }  // namespace
@@ -261,8 +265,14 @@ TEST_CASE("polygons arrive as they were sent, or not at all") {
         const std::uint64_t header[]{0, std::uint64_t(1) << 60, 0, 0, 0};
         send(header, sizeof header);
     });
-    CHECK_THROWS_AS(receivePolygons(boastful, std::size_t(1) << 30), ChildFailure);
+    CHECK_THROWS_AS(receivedFrom(boastful), ChildFailure);
+    sent.corners = {0, 1, 2};
+    sent.sizes = {3};
+    ChildProcess larger(ample, [&](const ChildProcess::Send& send) { sendPolygons(send, sent); });
+    CHECK_THROWS_AS(receivedFrom(larger, sent.points.size() * sizeof(glm::dvec3)), ChildFailure);
     ChildProcess complaining(ample, [](const ChildProcess::Send& send) { sendError(send, "no"); });
-    CHECK_THROWS_WITH(receivePolygons(complaining, 1000), "no");
+    CHECK_THROWS_WITH(receivedFrom(complaining, 1000), "no");
+    ChildProcess garbled(ample, [](const ChildProcess::Send& send) { sendError(send, "\x1b[2Jno\nway\n"); });
+    CHECK_THROWS_WITH(receivedFrom(garbled), " [2Jno way");
 }
 }  // namespace bilayer::child_process_test

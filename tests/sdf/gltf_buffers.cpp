@@ -43,8 +43,7 @@ TEST_CASE("glTF: buffers are regular files in the folder of the scene") {
 TEST_CASE("glTF: truncated and damaged binary files are rejected") {
     Gltf gltf = Gltf::cube();
     const auto path = gltf.writeBinary("whole.glb");
-    std::ifstream stream(path, std::ios::binary);
-    const std::string whole{std::istreambuf_iterator<char>(stream), {}};
+    const std::string whole = test::contentsOf(path);
     const auto cut = test::scratch("cut.glb");
     for (std::size_t size = 0; size < whole.size(); size += size < 40 ? 1 : 7) {
         std::ofstream(cut, std::ios::binary) << whole.substr(0, size);

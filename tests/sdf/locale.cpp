@@ -52,18 +52,13 @@ class CommaLocale {
     std::locale streams_;
 };
 
-std::string contentsOf(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
 // What the library makes of a mesh: the bytes of each file, and texts with numbers.
 std::vector<std::string> everythingOf(const Mesh& mesh) {
     std::vector<std::string> all;
     for (const char* ending : {".obj", ".ply", ".stl"}) {
         const std::filesystem::path path = test::scratch(std::string("locale") + ending);
         writeMesh(path, mesh);
-        all.push_back(contentsOf(path));
+        all.push_back(test::contentsOf(path));
         const Mesh again = readMesh(path);
         CHECK(again.triangles.size() == mesh.triangles.size());
         all.push_back(std::to_string(inspect(again).triangles));
@@ -75,7 +70,7 @@ std::vector<std::string> everythingOf(const Mesh& mesh) {
     CHECK(read.errorBound() == field.errorBound());
     CHECK(read.voxelSize() == field.voxelSize());
     writeNanoVdb(test::scratch("locale.nvdb"), field);
-    all.push_back(contentsOf(test::scratch("locale.nvdb")));
+    all.push_back(test::contentsOf(test::scratch("locale.nvdb")));
     try {
         (void)build(mesh, {.voxelSize = 1.5e-6f});
     } catch (const std::invalid_argument& error) {

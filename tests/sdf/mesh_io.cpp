@@ -108,8 +108,7 @@ TEST_CASE("files that end early are refused, wherever they end") {
         if (const auto path = test::corpusMesh(name)) whole.push_back(*path);
     for (const auto& path : whole) {
         CAPTURE(path);
-        std::ifstream file(path, std::ios::binary);
-        const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+        const std::string bytes = test::contentsOf(path);
         CHECK_NOTHROW(readMesh(path));
         for (const double part : {0.0, 0.01, 0.05, 0.2, 0.3, 0.5, 0.6, 0.7, 0.9, 0.97, 0.995}) {
             CAPTURE(part);

@@ -39,11 +39,6 @@ void writeBytes(const std::filesystem::path& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary) << bytes;
 }
 
-std::string bytesOf(const std::filesystem::path& path) {
-    std::ifstream stream(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 bool same(const std::vector<TileTriangle>& a, const std::vector<TileTriangle>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(TileTriangle)) == 0;
 }
@@ -84,7 +79,7 @@ TEST_CASE("damaged files are refused by name") {
     const std::filesystem::path stl = test::scratch("damaged.stl"), ply = test::scratch("damaged.ply");
     writeMesh(stl, shapes::sphere(1, 2));
     writeMesh(ply, shapes::sphere(1, 2));
-    const std::string facets = bytesOf(stl), faces = bytesOf(ply);
+    const std::string facets = test::contentsOf(stl), faces = test::contentsOf(ply);
     const auto refused = [](const std::filesystem::path& path, const std::string& bytes, const std::string& why) {
         writeBytes(path, bytes);
         CHECK_THROWS_WITH(trianglesOfFile(path), Contains(path.filename().string()) && Contains(why));

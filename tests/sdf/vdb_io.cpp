@@ -28,11 +28,6 @@ LevelSet torus() {
                  {.voxelSize = 0.05f, .exteriorWidthVoxels = 3, .interiorWidthVoxels = 2, .triangles = true});
 }
 
-std::string bytes(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
 }  // namespace
 
 TEST_CASE("a field survives its file") {
@@ -135,7 +130,7 @@ TEST_CASE("a field from elsewhere has no history") {
 
 TEST_CASE("truncated and foreign files are refused by name, wherever they are cut") {
     writeVdb(test::scratch("whole.vdb"), torus());
-    const std::string whole = bytes(test::scratch("whole.vdb"));
+    const std::string whole = test::contentsOf(test::scratch("whole.vdb"));
     for (const double part : {0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 0.999}) {
         const auto path = test::scratch("cut.vdb");
         std::ofstream(path, std::ios::binary) << whole.substr(0, std::size_t(part * double(whole.size())));
@@ -153,7 +148,7 @@ TEST_CASE("a file of ours with one wrong byte, or one too few or too many, is re
     CAPTURE(seed);
     test::Random random(seed);
     writeVdb(test::scratch("whole.vdb"), torus());
-    const std::string whole = bytes(test::scratch("whole.vdb"));
+    const std::string whole = test::contentsOf(test::scratch("whole.vdb"));
     const auto path = test::scratch("wrong_byte.vdb");
     for (int i = 0; i < 500; ++i) {
         const auto at = std::size_t(random(0, double(whole.size() - 23)));  // the checksum's line is 23 bytes long
@@ -187,7 +182,7 @@ TEST_CASE("A file whose voxels are too small for OpenVDB is refused by an error 
         if (!atOrigin) grid->insertMeta(metadata::origin, openvdb::Vec3DMetadata({1, 2, 3}));
         const auto path = test::scratch("tiny_voxels.vdb");
         openvdb::io::File(path.string()).write({grid});
-        std::string file = bytes(path);
+        std::string file = test::contentsOf(path);
         const auto replaceAll = [&](double from, double to) {
             const std::string old(reinterpret_cast<const char*>(&from), sizeof from);
             const std::string other(reinterpret_cast<const char*>(&to), sizeof to);

@@ -65,8 +65,7 @@ SceneFile exported(const char* format, const char* name) {
     const std::filesystem::path path = scratch(name);
     if (exporter.Export(cubeScene().get(), format, path.string()) != aiReturn_SUCCESS)
         throw std::runtime_error(exporter.GetErrorString());
-    std::ifstream stream(path, std::ios::binary);
-    return {name, {std::istreambuf_iterator<char>(stream), {}}};
+    return {name, contentsOf(path)};
 }
 
 SceneFile ac() {
@@ -230,6 +229,18 @@ SceneFile md2() {
     return {"cube.md2", bytes + std::string(4, '\0') + interleaved + frame + std::string(4, '\0')};
 }
 
+std::vector<SceneFile> gltfFiles() {
+    Gltf gltf = Gltf::cube();
+    gltf.file["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+        {"TRANSLATION", gltf.points({{0, 0, 0}, {5, 0, 0}})}};
+    gltf.file["skins"] = {{{"joints", {0}}}};
+    gltf.file["accessors"][0]["sparse"] = {
+        {"count", 1},
+        {"indices", {{"bufferView", gltf.view({7}, Gltf::UnsignedByte)}, {"componentType", 5121}}},
+        {"values", {{"bufferView", gltf.view({1, 1, 1}, Gltf::Float)}}}};
+    return {{"cube.gltf", contentsOf(gltf.write("cube.gltf"))}, {"cube.glb", contentsOf(gltf.writeBinary("cube.glb"))}};
+}
+
 }  // namespace
 
 std::vector<SceneFile> cubeFiles() {
@@ -278,6 +289,12 @@ std::vector<SceneFile> headFiles() {
         {"a.zae", zip({{"manifest.xml", "<dae_root>./a.dae</dae_root>"}, {"a.dae", "<COLLADA version=\"1.4.1\"/>"}})},
         {"a.pk3", zip({{"maps/a.bsp", "IBSP\x2e\0\0\0"s}})},
         {"a.3mf", zip({{"3D/nothing.txt", ""}})}};
+}
+
+std::vector<SceneFile> sceneFiles() {
+    std::vector<SceneFile> all;
+    for (const auto& files : {cubeFiles(), headFiles(), gltfFiles()}) all.insert(all.end(), files.begin(), files.end());
+    return all;
 }
 
 std::vector<SceneFile> parts3mf() {

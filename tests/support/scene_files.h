@@ -18,6 +18,9 @@ std::vector<SceneFile> cubeFiles();
 /// Only the first bytes of further binary formats, without a model.
 std::vector<SceneFile> headFiles();
 
+/// All of these, and glTF files with instances, a skin and sparse vertices.
+std::vector<SceneFile> sceneFiles();
+
 /// A ZIP archive of uncompressed files.
 std::string zip(const std::vector<SceneFile>& files);
 

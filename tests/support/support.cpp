@@ -8,9 +8,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <iostream>
+#include <iterator>
 #include <limits>
 
 namespace bilayer::test {
@@ -51,6 +53,11 @@ std::optional<std::filesystem::path> corpusMesh(const std::string& name) {
 std::filesystem::path scratch(const std::string& name) {
     static const Scratch once;
     return once.folder / name;
+}
+
+std::string contentsOf(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
 }
 
 bool isSanitized() {

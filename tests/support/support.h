@@ -18,6 +18,9 @@ std::optional<std::filesystem::path> corpusMesh(const std::string& name);
 /// A path in an empty folder of this process, removed at exit. The folder is created in BILAYER_SCRATCH if that is set.
 std::filesystem::path scratch(const std::string& name);
 
+/// The bytes of a file; none if it cannot be read.
+std::string contentsOf(const std::filesystem::path& path);
+
 /// A random seed: from the environment variable BILAYER_SEED, which ./run test sets, else from the clock. CAPTURE(seed)
 /// prints it with every failure.
 unsigned seed();
