@@ -40,7 +40,7 @@ struct Options {
     fs::path meshes = corpusFolder(), markdownFile;
     std::vector<std::string> names;
     float resolution = 96;
-    int drops = 12;
+    int drops = 36;
 };
 
 /// The same for every mesh and ground.

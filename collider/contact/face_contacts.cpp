@@ -34,7 +34,7 @@ void FaceContacts::visitLarge(std::uint32_t triangle) {
     };
     const SurfacePoints& points = field_.placed.collider.data().points();
     points.visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-        if (point.isBack || isOutside(scale * point.position, rounding)) return;
+        if (point.isInner || isOutside(scale * point.position, rounding)) return;
         if (const auto contact = contactOver(*face, true, index, point))
             found_.push_back({index, triangles_.id(triangle), *contact});
     });
@@ -89,7 +89,7 @@ std::vector<FaceContacts::SharpVertex> FaceContacts::sharpVerticesNear(
     const ColliderData& data = field_.placed.collider.data();
     std::vector<SharpVertex> vertices;
     data.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-        if (point.isSharp && !point.isBack && !data.edges().isWithinEdge(data.points(), index))
+        if (point.isSharp && !point.isInner && !data.edges().isWithinEdge(data.points(), index))
             vertices.push_back({scale * point.position, index});
     });
     std::sort(vertices.begin(), vertices.end(), [](const SharpVertex& a, const SharpVertex& b) {

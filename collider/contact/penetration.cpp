@@ -102,7 +102,7 @@ class PointSweep {
         body_ = &collider.field();
         const auto reject = [&](const glm::vec3& centre, float radius) { return !comesNear(centre, scale_ * radius); };
         collider.data().points().visit(reject, [&](std::uint32_t, const SurfacePoint& point) {
-            if (!(Surface::isOpen && point.isBack)) follow({point.position, point.normal});
+            if (!(Surface::isOpen && point.isInner)) follow({point.position, point.normal});
         });
     }
 

@@ -130,7 +130,7 @@ openvdb::GridBase::ConstPtr storePoints(const SurfacePoints& surface, float voxe
                                [](std::size_t i) { return std::int32_t(i); });
     addAttribute<std::int8_t>(*grid, *index, attribute::sharp, points,
                               [&](std::size_t i) { return points[i].isSharp; });
-    addAttribute<std::int8_t>(*grid, *index, attribute::back, points, [&](std::size_t i) { return points[i].isBack; });
+    addAttribute<std::int8_t>(*grid, *index, attribute::back, points, [&](std::size_t i) { return points[i].isInner; });
     grid->setName(contactPoints);
     return grid;
 }

@@ -16,6 +16,8 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "collider/contact/outer_side.h"
+
 namespace bilayer::detail {
 namespace {
 
@@ -36,7 +38,7 @@ struct Candidate {
     glm::dvec3 normal;
     double convexity;  // mean sine of the angle by which the surface recedes around the point; 0 on a plane, negative
                        // in a dent
-    bool isBack;       // of an open surface, or on its border
+    bool isInner;      // of an open surface, or on its border
 };
 
 struct Edge {
@@ -238,11 +240,11 @@ std::vector<Candidate> thin(std::vector<Candidate> candidates, double spacing, G
     return taken;
 }
 
-// The candidates as seen from behind, but for those on borders.
+// The candidates as seen from behind, but for those on borders, where normals are along the surface.
 std::vector<Candidate> backsOf(const std::vector<Candidate>& candidates) {
     std::vector<Candidate> backs;
-    for (const auto& [position, normal, convexity, isBack] : candidates)
-        if (!isBack) backs.push_back({position, -normal, -convexity, true});
+    for (const auto& [position, normal, convexity, isInner] : candidates)
+        if (!isInner) backs.push_back({position, -normal, -convexity, true});
     return backs;
 }
 
@@ -258,6 +260,18 @@ void keepOutside(std::vector<Candidate>& backs, double spacing, const SurfacePoi
     backs.resize(kept);
 }
 
+// Decides which points of open surfaces are inner ones: fronts that see less than their other side, and backs that do
+// not see more than it.
+template <class IsOpen>
+void findInner(std::vector<Candidate>& fronts, std::vector<Candidate>& backs, const OuterSide& sides, IsOpen&& isOpen) {
+    tbb::parallel_for(std::size_t(0), fronts.size(), [&](std::size_t i) {
+        Candidate& front = fronts[i];
+        front.isInner = front.isInner || (sides.isInner(front.position, front.normal) && isOpen(front));
+    });
+    tbb::parallel_for(std::size_t(0), backs.size(),
+                      [&](std::size_t i) { backs[i].isInner = !sides.isInner(backs[i].position, -backs[i].normal); });
+}
+
 std::vector<Candidate> pointsOf(const Mesh& mesh, double spacing, const SurfacePoints::IsOutside& isOutside) {
     const std::vector<Candidate> all = Candidates(mesh, spacing, isOutside).result;
     Grid grid(minGap * spacing, 2 * all.size());
@@ -265,6 +279,9 @@ std::vector<Candidate> pointsOf(const Mesh& mesh, double spacing, const SurfaceP
     if (!isOutside) return points;
     std::vector<Candidate> backs = thin(backsOf(all), spacing, grid);
     keepOutside(backs, spacing, isOutside);
+    findInner(points, backs, OuterSide(mesh, spacing), [&](const Candidate& front) {
+        return isOutside(front.position - thinnestWall * spacing * front.normal);
+    });
     points.insert(points.end(), backs.begin(), backs.end());
     return points;
 }
@@ -315,7 +332,7 @@ SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing, const IsOutside& i
     const Mesh welded = weld(mesh);
     for (const Candidate& point : pointsOf(welded, spacing, isOutside))
         points_.push_back(
-            {glm::vec3(point.position), glm::vec3(point.normal), point.convexity >= sharpConvexity, point.isBack});
+            {glm::vec3(point.position), glm::vec3(point.normal), point.convexity >= sharpConvexity, point.isInner});
     if (points_.empty()) throw std::invalid_argument("all triangles of the mesh are degenerate");
     order(points_, 0, std::uint32_t(points_.size()));
     addNode(points_, nodes_, 0, std::uint32_t(points_.size()));

@@ -16,9 +16,9 @@ struct SurfacePoint {
     glm::vec3 position;  ///< [m]
     glm::vec3 normal;    ///< outward, of unit length
     bool isSharp;        ///< on a convex edge or vertex, where faces with different normals meet; or on a border
-    /// On the back or the border of an open surface. Triangles of another body have two sides, too: only the front
-    /// tells which side of them the surface comes from, and these points do not touch them.
-    bool isBack = false;
+    /// On the inner side or the border of an open surface. Triangles of another body have two sides, too: only the
+    /// outer side, which faces away from the body, tells which of them it comes from. Inner points do not touch them.
+    bool isInner = false;
 };
 
 /// A node of the tree: a bounding sphere of consecutive points. Nodes are in preorder: the first child of node i is i +

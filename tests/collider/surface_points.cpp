@@ -80,7 +80,7 @@ TEST_CASE("an open surface has points on both sides, and points on its border th
     for (const SurfacePoint& p : points.points()) {
         up += p.normal.z > 0.99f;
         down += p.normal.z < -0.99f;
-        CHECK(p.isBack == !(p.normal.z > 0.99f));
+        CHECK(p.isInner == !(p.normal.z > 0.99f));
         if (std::abs(p.normal.z) > 0.99f) continue;
         CHECK(p.isSharp);
         const glm::vec2 fromCentre = glm::vec2(p.position) - 0.5f;
@@ -101,18 +101,18 @@ TEST_CASE("an open surface has points on both sides, and points on its border th
         }
 }
 
-TEST_CASE("the back of a shell is covered as its front, whichever of them is outside") {
+TEST_CASE("the inner side of a shell is covered as its outer side, whichever of them is the front") {
     for (const float radius : {0.15f, 0.2f, 0.3f, 0.5f})
         for (const bool isFlipped : {false, true}) {
             const Mesh ball = shapes::sphere(radius, 4);
             const SurfacePoints points(isFlipped ? shapes::flipped(ball) : ball, 0.1f,
                                        [](const glm::dvec3&) { return true; });
             CAPTURE(radius, isFlipped);
-            for (const bool isBack : {false, true})
+            for (const bool isInner : {false, true})
                 for (const glm::vec3& vertex : ball.points) {
-                    const glm::vec3 normal = glm::normalize(vertex) * (isBack == isFlipped ? 1.f : -1.f);
+                    const glm::vec3 normal = glm::normalize(vertex) * (isInner ? -1.f : 1.f);
                     const auto covers = [&](const SurfacePoint& p) {
-                        return p.isBack == isBack && glm::distance(p.position, vertex) < 0.1f &&
+                        return p.isInner == isInner && glm::distance(p.position, vertex) < 0.1f &&
                                glm::dot(p.normal, normal) > 0.5f && glm::dot(vertex - p.position, normal) < 0.005f;
                     };
                     REQUIRE(std::any_of(points.points().begin(), points.points().end(), covers));
@@ -120,14 +120,39 @@ TEST_CASE("the back of a shell is covered as its front, whichever of them is out
         }
 }
 
-TEST_CASE("a thin closed plate has no backs") {
+TEST_CASE("the inner side of an open surface is the one that faces its body") {
+    const Mesh body = shapes::box({0.5f, 0.5f, 0.1f});
+    for (const bool isFlipped : {false, true}) {
+        Mesh sheet{{{-0.3f, -0.3f, 0.15f}, {0.3f, -0.3f, 0.15f}, {0.3f, 0.3f, 0.3f}, {-0.3f, 0.3f, 0.3f}},
+                   {{0, 1, 2}, {0, 2, 3}}};
+        if (isFlipped) sheet = shapes::flipped(sheet);
+        const auto isOutside = [](const glm::dvec3& place) { return place.z > 0.1; };
+        const SurfacePoints points(shapes::join({body, sheet}), 0.05f, isOutside);
+        CAPTURE(isFlipped);
+        int inner = 0, outer = 0;
+        for (const SurfacePoint& p : points.points()) {
+            if (p.position.z < 0.11f) {
+                CHECK_FALSE(p.isInner);
+                continue;
+            }
+            if (std::abs(p.normal.z) < 0.9f) continue;  // on the border
+            CHECK(p.isInner == (p.normal.z < 0));
+            ++(p.isInner ? inner : outer);
+        }
+        CHECK(inner > 100);
+        CHECK(outer > 100);
+    }
+}
+
+TEST_CASE("a thin closed plate has no inner points") {
     const Mesh plate = shapes::box({0.5f, 0.5f, 0.00015f});
     const SurfacePoints points(plate, 0.02f, [](const glm::dvec3& place) { return std::abs(place.z) > 0.00015; });
     for (const bool isUp : {false, true})
         CHECK(std::any_of(points.points().begin(), points.points().end(), [&](const SurfacePoint& p) {
-            return !p.isBack && (isUp ? p.normal.z > 0.9f : p.normal.z < -0.9f);
+            return !p.isInner && (isUp ? p.normal.z > 0.9f : p.normal.z < -0.9f);
         }));
-    CHECK(std::none_of(points.points().begin(), points.points().end(), [](const SurfacePoint& p) { return p.isBack; }));
+    CHECK(
+        std::none_of(points.points().begin(), points.points().end(), [](const SurfacePoint& p) { return p.isInner; }));
 }
 
 TEST_CASE("points lie on the mesh, cover it at the spacing, and are not many more than that takes") {
@@ -263,7 +288,7 @@ TEST_CASE("normals point outward") {
             const SurfacePoint& point = points.points()[i];
             REQUIRE(windingNumber(mesh, glm::dvec3(point.position + 1e-3f * point.normal)) < 0.5);
             REQUIRE(windingNumber(mesh, glm::dvec3(point.position - 1e-3f * point.normal)) > 0.5);
-            REQUIRE_FALSE(point.isBack);
+            REQUIRE_FALSE(point.isInner);
         }
     }
 }

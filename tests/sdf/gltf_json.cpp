@@ -9,6 +9,7 @@
 
 #include "sdf/io/scene_io.h"
 #include "tests/support/gltf.h"
+#include "tests/support/gltf_refusals.h"
 #include "tests/support/polygons.h"
 #include "tests/support/support.h"
 

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/gltf.h"
+#include "tests/support/gltf_refusals.h"
 #include "tests/support/polygons.h"
 
 namespace bilayer::gltf_numbers_test {

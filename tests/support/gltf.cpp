@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/support/gltf.h"
 
-#include <catch2/catch.hpp>
 #include <cstring>
 #include <fstream>
-#include <stdexcept>
 
 #include "sdf/io/scene_io.h"
 #include "tests/support/support.h"
@@ -139,20 +137,6 @@ nlohmann::json& primitive(Gltf& gltf) {
 
 detail::Polygons readGltf(Gltf gltf) {
     return detail::readScene(gltf.write("test.gltf"));
-}
-
-void refuses(Gltf gltf, const Strings& words) {
-    const auto path = gltf.write("refused.gltf");
-    INFO(gltf.file.dump().substr(0, 3000));
-    try {
-        detail::readScene(path);
-        FAIL_CHECK("was read");
-    } catch (const std::runtime_error& error) {
-        const std::string text = error.what();
-        CHECK_THAT(text, Catch::Contains(path.string() + ": "));
-        CHECK(text.find('\n') == std::string::npos);
-        for (const std::string& word : words) CHECK_THAT(text, Catch::Contains(word));
-    }
 }
 
 }  // namespace bilayer::test

@@ -49,9 +49,4 @@ nlohmann::json& primitive(Gltf& gltf);
 /// Writes the file and reads it.
 detail::Polygons readGltf(Gltf gltf);
 
-using Strings = std::vector<std::string>;
-
-/// Checks that reading the file fails with one line that names it and contains all words.
-void refuses(Gltf gltf, const Strings& words);
-
 }  // namespace bilayer::test
