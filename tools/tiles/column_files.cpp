@@ -11,8 +11,8 @@ namespace bilayer::tools {
 using namespace bilayer::detail;
 
 void ColumnFiles::write(std::size_t tile) const {
-    const glm::ivec3 place = tiling_.place(tile);
-    const TileLoad& load = plan_.loads()[tile];
+    const glm::ivec3 place = tiles_.tiling.place(tile);
+    const TileLoad& load = tiles_.load(tile);
     if (load.triangles == 0) return;
     // a killed run may have left the file
     const bool isWritten = passes([&] {
@@ -21,13 +21,13 @@ void ColumnFiles::write(std::size_t tile) const {
     });
     if (isWritten) return;
     const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), load);
-    writeColumnSums(folder_.sums(place), crossingsOf(triangles, tiling_, tile, plan_.voxelSize()));
+    writeColumnSums(folder_.sums(place), crossingsOf(triangles, tiles_.tiling, tile, tiles_.plan.voxelSize()));
 }
 
 ColumnSums ColumnFiles::below(std::size_t tile) {
-    return crossingsBelow(tiling_, tile, [&](std::size_t other) {
-        if (plan_.loads()[other].triangles == 0) return ColumnSums({0, 0}, {0, 0});
-        const std::filesystem::path file = folder_.sums(tiling_.place(other));
+    return crossingsBelow(tiles_.tiling, tile, [&](std::size_t other) {
+        if (tiles_.load(other).triangles == 0) return ColumnSums({0, 0}, {0, 0});
+        const std::filesystem::path file = folder_.sums(tiles_.tiling.place(other));
         ColumnSums sums = readColumnSums(file);
         readBytes_ += std::filesystem::file_size(file);
         return sums;

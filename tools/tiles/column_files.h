@@ -7,15 +7,14 @@
 #include <vector>
 
 #include "sdf/sign/column_sums.h"
+#include "tools/tiles/planned_tiles.h"
 #include "tools/tiles/tile_folder.h"
-#include "tools/tiles/tile_plan.h"
 
 namespace bilayer::tools {
 
 class ColumnFiles {
   public:
-    ColumnFiles(const TileFolder& folder, const TilePlan& plan, const detail::Tiling& tiling)
-        : folder_(folder), plan_(plan), tiling_(tiling) {}
+    ColumnFiles(const TileFolder& folder, const PlannedTiles& tiles) : folder_(folder), tiles_(tiles) {}
 
     /// Writes the sums of a tile with triangles, unless they are there and intact. Throws as crossingsOf() and
     /// writeColumnSums() do.
@@ -28,8 +27,7 @@ class ColumnFiles {
 
   private:
     const TileFolder& folder_;
-    const TilePlan& plan_;
-    const detail::Tiling& tiling_;
+    const PlannedTiles& tiles_;
     std::uint64_t readBytes_ = 0;
 };
 

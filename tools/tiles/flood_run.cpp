@@ -36,8 +36,8 @@ void FloodRun::prepare(const std::vector<std::size_t>& share) {
 
 // A killed run may have left a tile's files.
 bool FloodRun::isFilled(std::size_t tile) const {
-    if (plan_.loads()[tile].triangles == 0) return true;
-    const glm::ivec3 place = tiling_.place(tile);
+    if (tiles_.load(tile).triangles == 0) return true;
+    const glm::ivec3 place = tiles_.tiling.place(tile);
     if (!std::filesystem::exists(folder_.border(place))) return false;
     try {
         std::string hash;
@@ -50,27 +50,28 @@ bool FloodRun::isFilled(std::size_t tile) const {
 
 // Writes the unsigned distances of a tile, then its border.
 void FloodRun::fill(std::size_t tile) const {
-    const glm::ivec3 place = tiling_.place(tile);
-    const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), plan_.loads()[tile]);
-    BuiltTile built = buildTile(triangles, plan_.facts(), tiling_, tile, options_, plan_.signs().signs);
-    if (!built.grids) return writeBorder(folder_.border(place), emptyBorder(tiling_.own(tile)), "");
-    openvdb::GridCPtrVec grids{withOrigin(built.grids->distance, plan_.facts().origin)};
-    if (built.grids->triangle) grids.push_back(withOrigin(built.grids->triangle, plan_.facts().origin));
+    const glm::ivec3 place = tiles_.tiling.place(tile);
+    const std::vector<TileTriangle> triangles = readTileTriangles(folder_.triangles(place), tiles_.load(tile));
+    BuiltTile built =
+        buildTile(triangles, tiles_.plan.facts(), tiles_.tiling, tile, tiles_.options, tiles_.plan.signs().signs);
+    if (!built.grids) return writeBorder(folder_.border(place), emptyBorder(tiles_.tiling.own(tile)), "");
+    openvdb::GridCPtrVec grids{withOrigin(built.grids->distance, tiles_.plan.facts().origin)};
+    if (built.grids->triangle) grids.push_back(withOrigin(built.grids->triangle, tiles_.plan.facts().origin));
     writeGrids(folder_.distances(place), grids);
     grids.clear();
-    const FloodTile flood(std::move(built.grids), tiling_, tile, options_);
+    const FloodTile flood(std::move(built.grids), tiles_.tiling, tile, tiles_.options);
     writeBorder(folder_.border(place), flood.border(), fileHash(folder_.distances(place)));
     ::malloc_trim(0);  // what one tile has used is free for the next
 }
 
 FloodBorder FloodRun::borderOf(std::size_t tile) const {
-    if (plan_.loads()[tile].triangles == 0) return emptyBorder(tiling_.own(tile));
-    return readBorder(folder_.border(tiling_.place(tile)));
+    if (tiles_.load(tile).triangles == 0) return emptyBorder(tiles_.tiling.own(tile));
+    return readBorder(folder_.border(tiles_.tiling.place(tile)));
 }
 
 void FloodRun::join() const {
     HashedRecordWriter record;
-    for (const RegionSides& sides : joinRegions(tiling_, [this](std::size_t tile) { return borderOf(tile); }))
+    for (const RegionSides& sides : joinRegions(tiles_.tiling, [this](std::size_t tile) { return borderOf(tile); }))
         record.add(sides);
     record.write(folder_.regions());
 }
@@ -78,7 +79,7 @@ void FloodRun::join() const {
 void FloodRun::readSides() {
     HashedRecordReader record(folder_.regions());
     sides_.clear();
-    for (std::size_t tile = 0; tile < tiling_.size(); ++tile) sides_.push_back(record.values<std::uint8_t>());
+    for (std::size_t tile = 0; tile < tiles_.size(); ++tile) sides_.push_back(record.values<std::uint8_t>());
     load_.bytes += record.size();
 }
 
@@ -124,17 +125,17 @@ std::vector<BorderArrival> FloodRun::arrivalsOf(Growth growth, std::size_t tile)
 }
 
 FloodTile FloodRun::load(std::size_t tile, bool withTriangles) {
-    const std::shared_ptr<Grids> grids = readGrids(folder_.distances(tiling_.place(tile)));
-    const auto transform = openvdb::math::Transform::createLinearTransform(double(options_.voxelSize));
+    const std::shared_ptr<Grids> grids = readGrids(folder_.distances(tiles_.tiling.place(tile)));
+    const auto transform = openvdb::math::Transform::createLinearTransform(double(tiles_.options.voxelSize));
     openvdb::ConstPtrCast<openvdb::FloatGrid>(grids->distance)->setTransform(transform);
     if (grids->triangle) openvdb::ConstPtrCast<openvdb::Int32Grid>(grids->triangle)->setTransform(transform);
-    FloodTile flood(grids, tiling_, tile, options_);
+    FloodTile flood(grids, tiles_.tiling, tile, tiles_.options);
     flood.setSides(sides_[tile]);
     for (const std::size_t other : around(tile)) {
         FloodNeighbour neighbour{borderOf(other), sides_[other]};
         neighbour.byDistance = arrivalsOf(Growth::byDistance, other);
         if (withTriangles) neighbour.byTriangles = arrivalsOf(Growth::byTriangles, other);
-        const std::filesystem::path file = folder_.border(tiling_.place(other));
+        const std::filesystem::path file = folder_.border(tiles_.tiling.place(other));
         if (std::filesystem::exists(file)) load_.bytes += std::filesystem::file_size(file);
         flood.add(neighbour);
     }
@@ -142,29 +143,29 @@ FloodTile FloodRun::load(std::size_t tile, bool withTriangles) {
 }
 
 WindingNumber FloodRun::trianglesOf(std::size_t tile) const {
-    return WindingNumber(
-        meshOf(readTileTriangles(folder_.triangles(tiling_.place(tile)), plan_.loads()[tile]), plan_.facts().origin));
+    return WindingNumber(meshOf(readTileTriangles(folder_.triangles(tiles_.tiling.place(tile)), tiles_.load(tile)),
+                                tiles_.plan.facts().origin));
 }
 
 // The tiles that touch a tile, at its edges and corners too.
 std::vector<std::size_t> FloodRun::around(std::size_t tile) const {
     std::vector<std::size_t> found;
-    const glm::ivec3 place = tiling_.place(tile), lower = glm::max(place - 1, glm::ivec3(0)),
-                     upper = glm::min(place + 1, tiling_.counts() - 1);
+    const glm::ivec3 place = tiles_.tiling.place(tile), lower = glm::max(place - 1, glm::ivec3(0)),
+                     upper = glm::min(place + 1, tiles_.tiling.counts() - 1);
     for (int x = lower.x; x <= upper.x; ++x)
         for (int y = lower.y; y <= upper.y; ++y)
             for (int z = lower.z; z <= upper.z; ++z)
-                if (const std::size_t other = tiling_.tileAt({x, y, z}); other != tile) found.push_back(other);
+                if (const std::size_t other = tiles_.tiling.tileAt({x, y, z}); other != tile) found.push_back(other);
     return found;
 }
 
 std::filesystem::path FloodRun::fileOf(Growth growth, std::size_t tile) const {
-    const glm::ivec3 place = tiling_.place(tile);
+    const glm::ivec3 place = tiles_.tiling.place(tile);
     return growth == Growth::byDistance ? folder_.byDistance(place) : folder_.byTriangles(place);
 }
 
 bool FloodRun::hasLeaves(std::size_t tile) const {
-    return plan_.loads()[tile].triangles > 0 && std::filesystem::exists(folder_.distances(tiling_.place(tile)));
+    return tiles_.load(tile).triangles > 0 && std::filesystem::exists(folder_.distances(tiles_.tiling.place(tile)));
 }
 
 BuiltTile FloodRun::build(std::size_t tile) {

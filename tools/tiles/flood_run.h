@@ -12,18 +12,17 @@
 #include "sdf/base/stopwatch.h"
 #include "sdf/tiles/flood_border.h"
 #include "sdf/tiles/flood_tile.h"
+#include "tools/tiles/planned_tiles.h"
 #include "tools/tiles/ranks.h"
 #include "tools/tiles/tile_folder.h"
-#include "tools/tiles/tile_plan.h"
 
 namespace bilayer::tools {
 
 class FloodRun {
   public:
     /// All arguments must outlive this.
-    FloodRun(const TileFolder& folder, const TilePlan& plan, const detail::Tiling& tiling, const BuildOptions& options,
-             const Ranks& ranks)
-        : folder_(folder), plan_(plan), tiling_(tiling), options_(options), ranks_(ranks) {}
+    FloodRun(const TileFolder& folder, const PlannedTiles& tiles, const Ranks& ranks)
+        : folder_(folder), tiles_(tiles), ranks_(ranks) {}
 
     /// Finds the sides of all voxels on borders, with all other ranks.
     /// @param share  of all tiles, for this rank
@@ -58,9 +57,7 @@ class FloodRun {
     bool hasLeaves(std::size_t tile) const;
 
     const TileFolder& folder_;
-    const TilePlan& plan_;
-    const detail::Tiling& tiling_;
-    const BuildOptions& options_;
+    const PlannedTiles& tiles_;
     const Ranks& ranks_;
     std::vector<detail::RegionSides> sides_;  // of all tiles
     Load load_;
