@@ -8,7 +8,8 @@
 
 namespace bilayer::detail {
 
-inline bool isFinite(const glm::vec3& v) {
+template <class Scalar>
+bool isFinite(const glm::vec<3, Scalar>& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 

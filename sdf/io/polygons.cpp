@@ -17,6 +17,7 @@
 
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/mesh_io.h>
+#include "sdf/base/finite.h"
 #include "sdf/base/large_array.h"
 #include "sdf/base/parallel_parts.h"
 #include "sdf/base/welding.h"
@@ -164,8 +165,7 @@ class FaceTriangulator {
                 continue;
             }
             outline.clear();
-            for (unsigned k = 0; k < polygons_.sizes[face]; ++k)
-                outline.push_back(glm::dvec3(polygons_.points[corners[k]]));
+            for (unsigned k = 0; k < polygons_.sizes[face]; ++k) outline.push_back(finitePoint(corners[k], face));
             const std::size_t first = result.triangles.size();
             if (!triangulate(outline, result.triangles) && result.uncovered++ == 0)
                 result.firstUncovered = {face, outline, std::span(result.triangles).subspan(first)};
@@ -175,6 +175,15 @@ class FaceTriangulator {
             }
         }
         return result;
+    }
+
+    glm::dvec3 finitePoint(unsigned index, std::size_t face) const {
+        const glm::dvec3 point(polygons_.points[index]);
+        if (!isFinite(point))
+            throw std::invalid_argument(
+                fmt::format("face {}, counted from 0, uses vertex {}, which is not finite: ({}, {}, {})", face, index,
+                            point.x, point.y, point.z));
+        return point;
     }
 
     const PolygonsOf<Scalar>& polygons_;

@@ -31,8 +31,7 @@ inline void require(bool holds, const std::string& what) {
     if (!holds) throw WrongAnswer(what);
 }
 
-/// Throws WrongAnswer if the text of an error is not one line of printable characters, longer than 1000 bytes, or in
-/// words of a library's insides.
+/// Throws WrongAnswer if the text of an error is not one line of printable characters, or longer than 1000 bytes.
 void requirePlainError(const std::string& text);
 
 /// A check, and inputs to start from.

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
@@ -70,6 +71,17 @@ void checkWritten(const Mesh& mesh) {
     }
 }
 
+/// The error names the file, in plain words. It may quote any word of the file.
+void requireReaderError(const std::string& text, const std::filesystem::path& path, Bytes file) {
+    require(text.starts_with(path.string() + ": "), "an error does not name the file");
+    const std::string reason = text.substr(path.string().size());
+    requirePlainError(reason);
+    const std::string_view bytes(reinterpret_cast<const char*>(file.data()), file.size());
+    for (const char* word : jargon)
+        require(reason.find(word) == std::string::npos || bytes.find(word) != std::string_view::npos,
+                "an error is not in plain words: " + reason);
+}
+
 void checkReader(Bytes file, const char* name, Reader read) {
     const std::filesystem::path path = fileOf(file, name);
     ReadReport report;
@@ -77,11 +89,9 @@ void checkReader(Bytes file, const char* name, Reader read) {
     try {
         mesh = read(path, report);
     } catch (const std::runtime_error& error) {
-        require(std::string(error.what()).starts_with(path.string() + ": "), "an error does not name the file");
-        return requirePlainError(std::string(error.what()).substr(path.string().size()));
+        return requireReaderError(error.what(), path, file);
     } catch (const std::invalid_argument& error) {
-        require(std::string(error.what()).starts_with(path.string() + ": "), "an error does not name the file");
-        return requirePlainError(std::string(error.what()).substr(path.string().size()));
+        return requireReaderError(error.what(), path, file);
     }
     requireMesh(mesh);
     requireNotes(report);
@@ -100,8 +110,6 @@ void requirePlainError(const std::string& text) {
     require(text.size() <= maxErrorBytes, "an error is too long: " + text);
     for (const char c : text)
         require(static_cast<unsigned char>(c) >= ' ' && c != '\x7f', "an error has control characters: " + text);
-    for (const char* word : jargon)
-        require(text.find(word) == std::string::npos, "an error is not in plain words: " + text);
 }
 
 void checkObj(Bytes file) {

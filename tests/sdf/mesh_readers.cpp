@@ -12,6 +12,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "box_files.h"
 #include "demos/shared/shapes.h"
+#include "sdf/io/polygons.h"
 #include "tests/support/support.h"
 
 namespace bilayer::mesh_readers_test {
@@ -119,6 +120,20 @@ TEST_CASE("Coordinates lose no more than 1e-6 of the mesh's size, at any distanc
             if (distance < 10 * size) CHECK(mesh.origin == glm::dvec3(0));
         }
     }
+}
+
+TEST_CASE("A polygon with a vertex that is not finite is refused before it is triangulated") {
+    for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+        for (const std::size_t place : {0u, 3u, 4u}) {
+            detail::Polygons polygons{
+                {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {1, 1, 0}, {0, 2, 0}}, {0, 1, 2, 3, 4}, {5}, {}};
+            polygons.points[place].y = bad;
+            ReadReport report;
+            CAPTURE(bad, place);
+            CHECK_THROWS_WITH(detail::assembled(polygons, "a.lwo", report),
+                              Contains("a.lwo: face 0, counted from 0, uses vertex " + std::to_string(place) +
+                                       ", which is not finite: ("));
+        }
 }
 
 TEST_CASE("Coordinates that the importer rounds by more than 1e-6 of the mesh's size are reported") {

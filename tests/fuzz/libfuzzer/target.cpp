@@ -2,6 +2,8 @@
 // All fuzzers in one program. The environment variable BILAYER_FUZZER names the check; other arguments are libFuzzer's.
 // `fuzzer --list` prints the names and maximum sizes, `fuzzer --seeds=DIR` writes the first inputs and the dictionary.
 #include <oneapi/tbb/global_control.h>
+#include <pthread.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -65,6 +67,10 @@ extern "C" int LLVMFuzzerInitialize(int* count, char*** arguments) {
     }
     // one thread: coverage depends on the input alone
     static const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 1);
+    // a process that reads a scene may end as it likes: it keeps no input, since findings are relative to this folder
+    ::pthread_atfork(nullptr, nullptr, [] {
+        if (::chdir("/") != 0) ::_exit(1);
+    });
     chosenCheck();
     return 0;
 }
