@@ -50,7 +50,7 @@ struct ExtensionOptions {
     /// Smooth ground: bodies with a field keep their energy when they slide or roll over the shallow edges of static
     /// triangle meshes and height fields, as over the smooth surface that the triangles stand for. At each edge whose
     /// faces differ by an angle t, an impact without a bounce takes the fraction sin^2(t) of a body's kinetic energy: a
-    /// block that slides over waves of 0.1 m on cells of its own size loses up to 85 % of its speed in 3 s. At the end
+    /// block that slides over waves of 0.1 m on cells of its own size loses up to 71 % of its speed in 3 s. At the end
     /// of each step, the linear velocity gets back what the step's impulses have taken.
     ///
     /// - Edges whose faces differ by less than 20 degrees count: the sharpest one of the ground below or just behind,
