@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bench/measure.h"
+#include "sdf/base/hash.h"
 
 namespace bilayer::bench {
 
@@ -48,13 +49,6 @@ double rate(double amount, int threads, const Work& work) {
     return median(rates);
 }
 
-// Mixes the bits of i well, so that no prefetcher detects a stride (the finaliser of splitmix64, Steele et al. 2014).
-std::uint64_t scattered(std::uint64_t i) {
-    i = (i ^ (i >> 30)) * 0xbf58476d1ce4e5b9u;
-    i = (i ^ (i >> 27)) * 0x94d049bb133111ebu;
-    return i ^ (i >> 31);
-}
-
 }  // namespace
 
 double streamBandwidth(int threads) {
@@ -75,7 +69,7 @@ double randomLines(std::size_t bytes, int threads) {
         std::uint64_t sum = 0;
         for (std::size_t i = 0; i < randomReads; ++i) {
             // the high half of the product is uniform over any count of lines, without a division
-            const std::uint64_t place = (scattered(i + std::size_t(thread) * randomReads) >> 32) * lines >> 32;
+            const std::uint64_t place = (detail::mixedBits(i + std::size_t(thread) * randomReads) >> 32) * lines >> 32;
             sum += buffer[place * (cacheLine / sizeof(std::uint64_t))];
         }
         sink = sum;

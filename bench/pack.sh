@@ -6,7 +6,7 @@ set -euo pipefail
 (($# >= 2)) && [[ $2 != -* ]] || { echo "usage: bench/pack.sh BUILD DIR [MESH...]" >&2; exit 2; }
 build=$1 folder=$2
 shift 2
-# What drivers may ask of the C library beside what the programs do: all of it must come from one and the same version.
+# What drivers may ask of the C library in addition to what the programs do: all of it must come from one and the same version.
 LIBC_PARTS=(libdl.so.2 libm.so.6 libpthread.so.0 libresolv.so.2 librt.so.1)
 
 [[ ! -e $folder ]] || { echo "pack: $folder is there already" >&2; exit 1; }

@@ -35,14 +35,15 @@ constexpr double anyConcavity = 1e9;  // disables the limit of concavity: only t
 
 class Field : public Rival {
   public:
-    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, ContactAccuracy measure)
+    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, ContactAccuracy accuracy)
         : sampler_(sampler),
-          name_(sampler                                         ? "bilayer, " + sampler.device()
-                : measure == ContactAccuracy::exactNearFeatures ? "bilayer"
-                                                                : fmt::format("bilayer, by {}", nameOf(measure))) {
+          name_(sampler                                          ? "bilayer, " + sampler.device()
+                : accuracy == ContactAccuracy::exactNearFeatures ? "bilayer"
+                : accuracy == ContactAccuracy::exact             ? "bilayer, by triangles"
+                                                                 : "bilayer, by samples") {
         BuildOptions how{.voxelSize = voxelSizeFor(mesh, voxels)};
         how.interiorWidthVoxels = bandInside;
-        const ColliderOptions options{.accuracy = measure};
+        const ColliderOptions options{.accuracy = accuracy};
         shape_ = std::make_unique<bullet::Shape>(std::make_shared<Collider>(mesh, build(mesh, how), options));
     }
     std::string name() const override { return name_; }
@@ -251,8 +252,9 @@ std::unique_ptr<btCollisionDispatcher> Rival::dispatcher(btCollisionConfiguratio
     return std::make_unique<btCollisionDispatcher>(&configuration);
 }
 
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler, ContactAccuracy measure) {
-    return timed<Field>(mesh, voxels, sampler, measure);
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler,
+                                 ContactAccuracy accuracy) {
+    return timed<Field>(mesh, voxels, sampler, accuracy);
 }
 
 std::unique_ptr<Rival> makeGImpact(const Mesh& mesh, float margin) {

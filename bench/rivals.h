@@ -32,7 +32,7 @@ class Rival {
 /// @param voxels   along the longest side
 /// @param sampler  samples the contact points; none: the CPU samples them as usual
 std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler = {},
-                                 ContactAccuracy measure = ContactAccuracy::exactNearFeatures);
+                                 ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures);
 
 /// btGImpactMeshShape.
 /// @param margin  added to the surface [m]

@@ -49,10 +49,10 @@ std::vector<Rival> rivals(const Options& options) {
     const Mesh mesh = shapes::box(halfBlock);
     const btVector3 half(halfBlock.x, halfBlock.y, halfBlock.z);
     std::vector<Rival> all;
-    for (const auto& [name, measure] : {std::pair{"bilayer", ContactAccuracy::exactNearFeatures},
-                                        {"bilayer, by samples", ContactAccuracy::samples},
-                                        {"bilayer, by triangles", ContactAccuracy::exact}})
-        all.push_back({name, demo::makeThing(mesh, {.voxelSize = options.voxelSize, .accuracy = measure})->shape});
+    for (const auto& [name, accuracy] : {std::pair{"bilayer", ContactAccuracy::exactNearFeatures},
+                                         {"bilayer, by samples", ContactAccuracy::samples},
+                                         {"bilayer, by triangles", ContactAccuracy::exact}})
+        all.push_back({name, demo::makePrototype(mesh, {.voxelSize = options.voxelSize, .accuracy = accuracy})->shape});
     all.push_back({"btBoxShape", std::make_shared<btBoxShape>(half)});
     all.push_back({"btBoxShape, btInternalEdgeUtility", std::make_shared<btBoxShape>(half), true});
     struct GImpact {

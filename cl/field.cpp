@@ -161,7 +161,7 @@ DeviceField::DeviceField(const Device& device, const Mesh& mesh, const BuildOpti
 }
 
 OpenclTimes DeviceField::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
-    requireSameLength(points.size(), samples.size(), "samples");
+    requireSameLength(points.size(), "points", samples.size(), "samples");
     const std::lock_guard lock(data_->mutex);
     Timing timing(data_->profile);
     try {

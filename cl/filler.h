@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fills blocks by the build methods on an OpenCL device; kernels in the .cl files of this folder. A block is a leaf of
+// Fills blocks by the build methods on an OpenCL device; the kernels are in cl/kernels. A block is a leaf of
 // 8^3 voxels.
 #pragma once
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Construction of colliders from meshes and from files.
+// What a collider holds.
 #include <bilayer/collider/collider.h>
 
 #include <stdexcept>

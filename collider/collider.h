@@ -24,7 +24,7 @@ enum class ContactAccuracy {
     exact,              ///< triangles everywhere
 };
 
-/// The name in files and on the command line: samples, edges or triangles.
+/// The name in files, on the command line and in Python: samples, exact-near-features or exact.
 const char* nameOf(ContactAccuracy accuracy);
 
 /// Options for making a collider.

@@ -63,7 +63,7 @@ struct Contact {
     /// The rounding radius of a vertex or edge that the contact position is fixed to, on the body that owns the feature
     /// [m]; the position rotates with that body. Negative: the position is the closest point of two surfaces, and
     /// remains so while they roll.
-    float turningRadius = -1;
+    float roundingRadius = -1;
 
     /// The distance after the predicted motion, if nothing stops it [m].
     float remaining() const { return distance - approach; }

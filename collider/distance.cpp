@@ -37,6 +37,11 @@ struct Bodies {
     Bodies swapped() const { return {b, a, aToB.inverted()}; }
 };
 
+/// Of the larger body [m].
+double sizeOf(const Bodies& bodies) {
+    return std::max(detail::sizeOf(bodies.a), detail::sizeOf(bodies.b));
+}
+
 BodyDistance separated(const Bodies& bodies, const MeshDistance& found) {
     const Similarity bToWorld = toWorld(bodies.b);
     const double distance = found.distance * bToWorld.scale;
@@ -44,7 +49,7 @@ BodyDistance separated(const Bodies& bodies, const MeshDistance& found) {
                         .distance = float(distance),
                         .a = witness(bToWorld, found.a, found.triangleA),
                         .b = witness(bToWorld, found.b, found.triangleB)};
-    if (distance > minDirection * std::max(sizeOf(bodies.a), sizeOf(bodies.b)))
+    if (distance > minDirection * sizeOf(bodies))
         answer.normal = bToWorld.rotation * glm::normalize(found.a.position - found.b.position);
     return answer;
 }
@@ -82,8 +87,8 @@ Depth deepestSample(const Bodies& bodies) {
     return deepest;
 }
 
-// Moves the point along the first surface as far as it gets deeper: to where the surface is closest to a point that
-// lies ahead in the direction of penetration. The lead is halved when that leads elsewhere.
+// Moves the point along the first surface as far as it gets deeper: to where the surface is closest to a point ahead in
+// the direction of penetration. A step that does not get deeper divides the distance to that point by four.
 Depth refined(Depth depth, const Bodies& bodies) {
     const Field &own = bodies.a.collider.exactField(), &field = bodies.b.collider.exactField();
     const float voxel = field.voxelSize();
@@ -137,7 +142,7 @@ BodyDistance contained(BodyDistance deepest, Overlap overlap) {
 BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& options, DistanceStart* start) {
     for (const Placed* body : {&a, &b}) requireUnitRotation(body->pose);
     const Bodies bodies{a, b, toWorld(a).into(toWorld(b))};
-    const double limit = std::max(double(options.maxDistance), 0.0) / double(b.scale);
+    const double limit = searchLimit(options, sizeOf(bodies)) / double(b.scale);
     const MeshDistance found =
         distanceBetween(a.collider.data().meshTree(), b.collider.data().meshTree(), bodies.aToB, limit,
                         start ? TriangleIndices{start->triangleA, start->triangleB} : TriangleIndices{});

@@ -13,7 +13,8 @@ namespace bilayer {
 
 /// Options of distance().
 struct DistanceOptions {
-    /// The search ends early if the separation exceeds this [m]. Zero finds only bodies that overlap or touch.
+    /// The search ends early if the separation exceeds this [m] by more than 2e-6 of the size of the larger collider.
+    /// Zero finds only bodies that overlap or touch. A negative limit is zero.
     float maxDistance = std::numeric_limits<float>::infinity();
 };
 
@@ -71,16 +72,17 @@ BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& o
 ///   of the sizes of both bodies.
 /// - A shape that overlaps the collider: the depth of the deepest contact of collide(), and of the vertices of either
 ///   body. The vertices of a rounded shape are those of its core, as deep as its radius takes them.
-/// - Triangles of a sheet have no inside: a collider that they do not cut is separated from them.
+/// - An open surface has no inside: a collider that its triangles do not cut is separated from it.
 ///
-/// Throws std::invalid_argument if neither is a collider, a scale is not positive, or a rotation is no unit quaternion.
+/// Allocates where the shapes overlap. Throws std::invalid_argument if neither is a collider, a scale is not positive,
+/// or a rotation is no unit quaternion.
 BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const DistanceOptions& options = {},
                       DistanceStart* start = nullptr);
 
 /// Options of timeOfImpact().
 struct ImpactOptions {
-    /// Bodies touch at this separation [m]. At least 1e-5 of the size of the larger body counts. By default it is a
-    /// twentieth of the smaller voxel.
+    /// Bodies touch at this separation [m]. Smaller values than 1e-5 of the size of the larger body are raised to that.
+    /// 0 stands for a twentieth of the smaller voxel.
     float tolerance = 0;
     /// Finds the first penetration instead of the first touch. Bodies may start in contact, and rest, slide and roll on
     /// each other; only penetration deeper than contacts handle is found. The tolerance has no effect.
@@ -99,16 +101,17 @@ struct Impact {
 /// When two bodies touch that move from their poses by their motions. Both motions take the same time; positions change
 /// at constant velocities, and rotations about the pose positions at constant angular velocities.
 ///
-/// The bodies do not touch before, whatever their speed and however thin they are. The fraction found may be
-/// early by what they need to approach by the tolerance: bodies that pass each other within it count as touching.
+/// The bodies do not touch before, whatever their speed and however thin they are. The fraction found may be early by
+/// the time in which they approach by the tolerance: bodies that pass each other within it count as touching.
 /// Bodies that are as near as the tolerance at the start, or overlap, touch at the start, in whatever direction they
 /// move.
 ///
 /// By conservative advancement (B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", 1996): no point
 /// approaches faster than the bodies' velocities and the rotations at their radii allow. Takes a distance() for each
 /// step, most of which shorten the separation by a constant factor. A motion that takes more than 10,000 of them ends
-/// there, as if the bodies touched: they slide along each other by 10,000 of their gaps. Throws std::invalid_argument
-/// for motions that are not finite, or rotate by more than 1000 rad, and for rotations that are no unit quaternions.
+/// there, as if the bodies touched: they slide along each other by 10,000 times their separation. Throws
+/// std::invalid_argument for motions that are not finite, or rotate by more than 1000 rad, and for rotations that are
+/// no unit quaternions.
 ///
 /// With ImpactOptions::penetration, points of either body are followed along their paths through the other one: the
 /// surface points of a collider, the vertices and edges of other shapes. A point penetrates where it gets more than a
@@ -117,7 +120,7 @@ struct Impact {
 Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options = {});
 
 /// The same for two shapes, at least one of them a collider. Throws std::invalid_argument also if neither is, and for a
-/// plane or a sheet of triangles that rotates and may be touched: its far points would have no finite speed.
+/// plane or an open surface that rotates and may be touched: its far points would have no finite speed.
 Impact timeOfImpact(const PlacedShape& a, const PlacedShape& b, const ImpactOptions& options = {});
 
 }  // namespace bilayer

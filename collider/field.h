@@ -29,7 +29,8 @@ using Floats [[gnu::vector_size(16)]] = float;
 
 /// The block that a FieldSampler sampled last.
 struct LastBlock {
-    /// The upper words of fixed-point places in it, along x, y, y, z. Without a block: no place has two different y.
+    /// The block's coordinates x, y, y, z: the upper words of the fixed-point positions in it. The initial value has
+    /// two different y, so that no position is in it.
     alignas(16) std::array<std::uint32_t, 4> place{0, 0, 1, 0};
     const void* first = nullptr;  ///< its first voxel
 };
@@ -86,15 +87,16 @@ class Field {
     /// With the mesh:
     /// - The result is exact to 1e-5 voxels up to ten voxels away, and to a millionth of the distance beyond.
     /// - The sign is the field's wherever that is certain: farther than a voxel's diagonal from the surface, and mostly
-    ///   nearer. inside() and the sign of sample() agree with it there; but for sample() in a hole wider than a voxel,
-    ///   where the side changes between two voxels without a surface.
-    /// - Elsewhere, in a closed mesh signed by normals or winding numbers, it is that of the mesh's winding number. In
-    ///   one signed by normals, the normal at the closest feature decides where the sample agrees with it, and within a
-    ///   tenth of a voxel of the surface. That errs only where the surface comes within a voxel of itself.
-    /// - Elsewhere, in an open mesh signed by winding numbers, it is that of the winding number. Over a face with no
-    ///   other surface within a voxel, the normal decides, which is faster.
-    /// - Elsewhere, in other meshes, the normal decides if the field confirms that the wall separates inside from
-    ///   outside; otherwise the sample.
+    ///   nearer. inside() and the sign of sample() agree with it there, with one exception: sample() in a hole wider
+    ///   than a voxel, where the side changes between two voxels without a surface.
+    /// - Where the field is not certain, the kind of mesh decides:
+    ///   - closed, signed by winding numbers: the winding number.
+    ///   - closed, signed by normals: the normal at the closest feature, where the sample agrees with it and within a
+    ///     tenth of a voxel of the surface; else the winding number. It errs only where the surface comes within a
+    ///     voxel of itself.
+    ///   - open, signed by winding numbers: the winding number; over a face with no other surface within a voxel the
+    ///     normal, which is faster.
+    ///   - others: the normal if the field confirms that the wall separates inside from outside, else the sample.
     /// - Any one of the features that are equally close within the tolerance is returned. At an edge or vertex itself,
     ///   to 1e-5 voxels or the rounding of the point, it is that edge or vertex.
     ///

@@ -57,7 +57,7 @@ struct RayHit {
     float distance = 0;     ///< along the ray [m]
     glm::vec3 position{0};  ///< on the surface; the origin if the ray starts inside [m]
     /// Outward unit normal; the reversed ray direction where none is known. That of a face hit from behind faces the
-    /// origin: a sheet's, or a face beyond an edge that the ray grazes to within the tolerance.
+    /// origin: that of an open surface, or a face beyond an edge that the ray grazes to within the tolerance.
     glm::vec3 normal{0};
     std::uint32_t triangle = noTriangle;  ///< index in the mesh; `noTriangle` without a mesh or for a start inside
 };

@@ -93,9 +93,10 @@ ContactShape ContactShape::plane(const glm::vec3& normal, float offset) {
     return ContactShape(ContactShapeData{HalfSpace{normal / length, offset}});
 }
 
-ContactShape ContactShape::triangles(TriangleSheet sheet) {
-    if (!sheet.visit) throw std::invalid_argument("TriangleSheet::visit is empty; it must pass the triangles in a box");
-    return ContactShape(ContactShapeData{std::move(sheet)});
+ContactShape ContactShape::triangles(OpenSurface openSurface) {
+    if (!openSurface.visit)
+        throw std::invalid_argument("OpenSurface::visit is empty; it must pass the triangles in a box");
+    return ContactShape(ContactShapeData{std::move(openSurface)});
 }
 
 }  // namespace bilayer

@@ -24,7 +24,7 @@ using Triangle = std::array<glm::vec3, 3>;
 /// The triangles of a height field, or of a mesh of another library, as they are asked for. They are an open surface:
 /// both sides of a triangle are outside, and nothing is inside. Triangles that share an edge or a vertex have equal
 /// coordinates there, to the bit. A triangle with a corner that is not finite touches nothing.
-struct TriangleSheet {
+struct OpenSurface {
     /// @param id  a number of the triangle that no other has, the same at each call
     using Visitor = std::function<void(const Triangle& triangle, std::uint64_t id)>;
     /// Passes at least the triangles that meet a box, each once. Called from the threads that collide the shape, also
@@ -66,8 +66,8 @@ class ContactShape {
     /// The half-space of all x with dot(normal, x) <= offset.
     /// @param normal  of any length above 0; `offset` is for its unit vector
     static ContactShape plane(const glm::vec3& normal, float offset);
-    /// Throws std::invalid_argument if the sheet has no function.
-    static ContactShape triangles(TriangleSheet sheet);
+    /// Throws std::invalid_argument if the surface has no function.
+    static ContactShape triangles(OpenSurface openSurface);
 
     /// The collider, if the shape was made of one; null otherwise.
     const Collider* collider() const;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Tested by tests/collider/time_of_impact.cpp through timeOfImpact().
 #include <bilayer/collider/distance.h>
 
 #include <fmt/format.h>
@@ -47,7 +48,7 @@ void requireFinite(const Motion& motion, const std::string& name) {
 /// What the search must know of a body.
 struct Extent {
     double radius = 0;  ///< the largest distance of a point from the pose position [m]
-    double size = 0;    ///< the longest side of the bounds [m]; 0 for planes and sheets
+    double size = 0;    ///< the longest side of the bounds [m]; 0 for planes and open surfaces
     double voxel = std::numeric_limits<double>::infinity();  ///< of the field, if it has one [m]
 };
 
@@ -71,7 +72,7 @@ Extent extentOf(const PlacedShape& body, const std::string& motion) {
     if (body.shape.collider()) return extentOf(placed(body));
     if (const auto* convex = std::get_if<Convex>(&shape)) return extentOf(*convex, double(body.scale));
     if (body.motion.rotation != glm::vec3(0))
-        throw std::invalid_argument(motion + " must not rotate: a plane or a sheet of triangles has no radius");
+        throw std::invalid_argument(motion + " must not rotate: a plane or an open surface has no radius");
     return {};
 }
 

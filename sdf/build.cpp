@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The public functions of a build: options, threads, and whether the whole field is filled.
+// The public functions of a build. They call those of grid/field_build.h.
 #include <bilayer/sdf/build.h>
 
 #include <fmt/format.h>

@@ -15,7 +15,7 @@ struct Grids;
 
 /// Times of the phases of a build [s], and the count of blocks that it filled.
 struct BuildTimes {
-    double tiles = 0;     ///< sorting triangles into sample tiles, or choosing a sign method
+    double prepare = 0;   ///< choosing the sign method, uniting solids, finding what an update must fill
     double fill = 0;      ///< binning triangles into blocks, computing distances
     double assemble = 0;  ///< building the tree, signs far from the surface, signs by winding number or flood
     double total = 0;     ///< of the whole build
@@ -32,7 +32,7 @@ class LevelSet {
     /// are not a valid level set:
     /// - another grid class, or no active voxel;
     /// - a transform other than a uniform scale and a shift by whole voxels;
-    /// - voxels below 1e-15 m or above 1e15 m;
+    /// - voxels below 2e-5 m or above 1e15 m;
     /// - a width that is not positive or exceeds 2^23 voxels;
     /// - an error bound that is negative, no number, or below that of its method; a negative count;
     /// - an unknown method or sign method, or signs that the method does not have.

@@ -20,6 +20,7 @@
 
 #include "sdf/base/equal_points.h"
 #include "sdf/base/finite.h"
+#include "sdf/base/hash.h"
 #include "sdf/base/large_array.h"
 #include "sdf/base/parallel_parts.h"
 #include "sdf/base/welding.h"
@@ -36,8 +37,8 @@ constexpr std::size_t itemsPerRun = 1 << 14;
 // Calls body(run, begin, end) for runs of the indices below n, in parallel.
 template <class Body>
 void forEachRun(std::size_t n, Body body) {
-    inOrder((n + itemsPerRun - 1) / itemsPerRun,
-            [&](std::size_t run) { body(run, run * itemsPerRun, std::min(n, (run + 1) * itemsPerRun)); });
+    inParallel((n + itemsPerRun - 1) / itemsPerRun,
+               [&](std::size_t run) { body(run, run * itemsPerRun, std::min(n, (run + 1) * itemsPerRun)); });
 }
 
 // Keeps the items for which keeps(index) returns true, in order. Returns the new start of each run. keeps() is called
@@ -121,23 +122,16 @@ std::size_t firstWhere(std::size_t n, Holds holds) {
         [](std::size_t a, std::size_t b) { return std::min(a, b); });
 }
 
-// Mixes a word into a hash: an FNV-1a step on 64 bits, with the high bits folded down.
-std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) {
-    constexpr std::uint64_t prime = 1099511628211ull;
-    const std::uint64_t product = (hash ^ word) * prime;
-    return product ^ (product >> 32);
-}
-
 // Hashes runs of fixed length, so that the runs can be hashed in parallel.
 std::uint64_t hashOfRuns(std::span<const std::uint32_t> words) {
     constexpr std::size_t run = 1 << 15;
     std::vector<std::uint64_t> hashes((words.size() + run - 1) / run, 0);
     tbb::parallel_for(std::size_t(0), hashes.size(), [&](std::size_t i) {
         for (const std::uint32_t word : words.subspan(i * run, std::min(run, words.size() - i * run)))
-            hashes[i] = mixed(hashes[i], word);
+            hashes[i] = mixedHash(hashes[i], word);
     });
     std::uint64_t all = words.size();
-    for (const std::uint64_t hash : hashes) all = mixed(all, hash);
+    for (const std::uint64_t hash : hashes) all = mixedHash(all, hash);
     return all;
 }
 
@@ -164,8 +158,9 @@ void validate(const Mesh& mesh) {
     const std::size_t points = mesh.points.size(), triangles = mesh.triangles.size();
     if (triangles == 0) throw std::invalid_argument("the mesh has no triangle");
     if (points >= std::numeric_limits<unsigned>::max() || triangles >= std::size_t(std::numeric_limits<int>::max()))
-        throw std::invalid_argument(
-            fmt::format("the mesh is too large: {} vertices, {} triangles; at most 2^31 - 2", points, triangles));
+        throw std::invalid_argument(fmt::format(
+            "the mesh is too large: {} vertices, of at most 2^32 - 2, and {} triangles, of at most 2^31 - 2", points,
+            triangles));
     const std::size_t p = firstWhere(points, [&](std::size_t i) { return !isFinite(mesh.points[i]); });
     if (p < points)
         throw std::invalid_argument(fmt::format("vertex {} is not finite: ({}, {}, {})", p, mesh.points[p].x,
@@ -250,7 +245,7 @@ std::uint64_t hash(const Mesh& mesh) {
         return std::span(reinterpret_cast<const std::uint32_t*>(items.data()), 3 * items.size());
     };
     const std::uint64_t points = hashOfRuns(words(mesh.points)), triangles = hashOfRuns(words(mesh.triangles));
-    return mixed(mixed(mesh.points.size(), points), triangles);
+    return mixedHash(mixedHash(mesh.points.size(), points), triangles);
 }
 
 }  // namespace bilayer

@@ -37,8 +37,8 @@ struct MeshFile {
 /// floats would round its coordinates by more than 1e-6 of its size is moved near to it, and Mesh::origin stores the
 /// shift. That is so from 16.8 times its size on.
 ///
-/// Throws std::runtime_error if the file cannot be read or holds no triangle. The error names the file and, where
-/// known, the line and its text. Throws std::invalid_argument for coordinates that are not finite.
+/// Throws std::runtime_error if the file cannot be read, holds no triangle, or has a face with a coordinate that is not
+/// finite. The error names the file and, where known, the line and its text.
 Mesh readMesh(const std::filesystem::path& path);
 /// The same, with a report of what the file held and what was left out.
 MeshFile readMeshFile(const std::filesystem::path& path);

@@ -174,8 +174,9 @@ void addBody(CLI::App& command, BuildArguments& a) {
                     "also store surface points, mass, margin and the mesh: all that a collider needs");
     auto* contacts =
         group
-            ->add_option("--contacts", a.contacts,
-                         "contact accuracy: samples alone, exact triangles near edges (default), or everywhere")
+            ->add_option(
+                "--contacts", a.contacts,
+                "contact accuracy: samples alone, triangles near edges: exact-near-features (default), or everywhere")
             ->check(CLI::IsMember(contactAccuracies));
     auto* noMesh =
         group->add_flag("--no-mesh", a.noMesh, "store no mesh: the file is smaller, and sharp edges are rounded");
@@ -263,7 +264,7 @@ Json toJson(const BuildArguments& a, const BuildOutcome& o, const Mesh& mesh, co
                {{"read", o.read},
                 {"inspect", o.inspect},
                 {"build", o.build},
-                {"parts", {{"tiles", o.times.tiles}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
+                {"parts", {{"prepare", o.times.prepare}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
                 {"extend", o.extend},
                 {"body", o.body},
                 {"write", o.write}}},
@@ -308,7 +309,7 @@ void printTable(const BuildArguments& a, const BuildOutcome& o, const Mesh& mesh
         table.row("note", "the field has no inside: every voxel is outside; try another --sign, or close the mesh");
     if (a.body) addRows(table, bodyOf(field));
     table.row("filled by", fmt::format("{} on {}", a.backend, o.device));
-    table.row("build", fmt::format("{:.3f} s: tiles {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.tiles,
+    table.row("build", fmt::format("{:.3f} s: prepare {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.prepare,
                                    o.times.fill, o.times.assemble));
     table.row("files", fmt::format("{:.3f} s to read, {:.3f} s to write", o.read, o.write));
     table.row("peak memory", bytes(peakMemory()));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer query`, `surface` and `export`: field values as numbers, as a mesh, and as grids for a GPU.
+// Tested by tests/tools/field.cpp through run().
 #include <fmt/format.h>
 
 #include <charconv>

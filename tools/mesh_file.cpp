@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sdf/base/hash.h"
 #include "sdf/io/content_hash.h"
 #include "sdf/io/gltf_buffers.h"
 #include "sdf/io/input_file.h"

@@ -279,7 +279,7 @@ Json toJson(const Body& body, const glm::dvec3& origin) {
 void addRows(Table& table, const Body& body) {
     const std::string mesh = body.mesh ? grouped(body.mesh->triangles.size()) + " triangles" : "no mesh";
     table.row("body",
-              fmt::format("{} surface points, margin {}, {}, contacts by {}{}", grouped(body.points.points().size()),
+              fmt::format("{} surface points, margin {}, {}, contacts {}{}", grouped(body.points.points().size()),
                           metres(body.margin), mesh, nameOf(body.accuracy), body.mass ? "" : ", without a mass"));
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer inspect`, `info` and `devices`: the read-only commands.
+// Tested by tests/tools/report.cpp through run().
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/tools/Diagnostics.h>
@@ -140,7 +141,7 @@ std::string whyMassless(const LevelSet& field) {
     } catch (const std::invalid_argument& error) {
         return error.what();
     }
-    return "its body is stored without";
+    return "its body is stored without mass properties";
 }
 
 Bounds activeBounds(const LevelSet& field) {

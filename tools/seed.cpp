@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer seed`: combines meshes and fields into one liquid level set, optionally with marker particles.
+// Tested by tests/tools/seed.cpp through run().
 #include <fmt/format.h>
 
 #include <cmath>

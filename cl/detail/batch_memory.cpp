@@ -58,7 +58,9 @@ std::uint64_t totalBytes(const BatchSize& size, const PartBytes& bytes, bool wit
 }
 
 std::uint64_t largestBuffer(const BatchSize& size, const PartBytes& bytes, bool withTriangles) {
-    return std::max(ResultLayout(size.blocks, withTriangles).end, size.slots * std::max(bytes.piece, bytes.columns));
+    const std::uint64_t perPart =
+        std::max({bytes.piece, bytes.unsorted, bytes.sorted, bytes.cell, bytes.columns, bytes.groupBegin});
+    return std::max({ResultLayout(size.blocks, withTriangles).end, size.slots * perPart, size.bricks * bytes.brick});
 }
 
 }  // namespace bilayer::detail

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "cl/detail/memory.h"
 
@@ -35,6 +36,9 @@ struct BatchSize {
 
     bool covers(const BatchSize& other) const { return bricks >= other.bricks && slots >= other.slots; }
 };
+
+/// The x of the origin of an empty slot for a block.
+inline constexpr int noBlock = std::numeric_limits<int>::min();
 
 /// Offsets of a batch's results in its buffer [bytes], aligned for any device.
 struct ResultLayout {

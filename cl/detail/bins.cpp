@@ -18,7 +18,7 @@ constexpr std::size_t itemsPerUnit = 2048;  // items that a GPU's unit holds
 
 BrickGrid gridFor(const FillJob& job, float reach, float margin) {
     BrickGrid grid{};
-    grid.voxelsPerUnit = 1.0 / double(job.mesh.voxelSize);
+    grid.voxelsPerUnit = 1.0 / double(job.input.voxelSize);
     grid.reach = double(reach);
     grid.margin = double(margin);
     const int side = brickSideFor(job.box, grid.voxelsPerUnit, reach);
@@ -30,7 +30,7 @@ BrickGrid gridFor(const FillJob& job, float reach, float margin) {
         grid.size[axis] = brick(double(job.box.upper[axis]) * grid.voxelsPerUnit + grid.reach) - grid.first[axis] + 1;
         grid.cells *= cl_uint(grid.size[axis]);
     }
-    grid.triangles = cl_uint(job.mesh.mesh.triangles.size());
+    grid.triangles = cl_uint(job.input.mesh.triangles.size());
     const DoubleLayerOptions& layers = job.options.doubleLayer;
     grid.sampling = {double(layers.epsilon), layers.maxSubdivision, layers.fillGaps,
                      layers.subdivision == Subdivision::recursive};
@@ -42,7 +42,7 @@ BrickGrid gridFor(const FillJob& job, float reach, float margin) {
 DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMemory& memory, const FillJob& job,
                        float reach, float margin, bool gpuMapping, Timing& timing)
     : grid_(gridFor(job, reach, margin)) {
-    const Mesh& mesh = job.mesh.mesh;
+    const Mesh& mesh = job.input.mesh;
     const cl::CommandQueue& queue = device.queue;
     const std::size_t units = std::max(1u, device.info.computeUnits), count = mesh.triangles.size();
     const std::size_t items =
@@ -79,8 +79,8 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
     queue.enqueueReadBuffer(total, CL_TRUE, 0, sizeof totals, totals.data(), nullptr,
                             timing.event(Timing::Command::download));
     const auto [bricks, entries, parts] = totals;
-    if (std::max(entries, parts) > std::numeric_limits<cl_uint>::max())
-        memory.refuse(entries * sizeof(cl_uint), "the binning of the mesh");
+    if (const cl_ulong most = std::max(entries, parts); most > std::numeric_limits<cl_uint>::max())
+        memory.refuse(most * sizeof(cl_uint), "the binning of the mesh");
     list_ = bins(std::max<std::uint64_t>(1, entries) * sizeof(cl_uint));
     run("listTriangles", items, local, points_, triangles_, grid_, cursors, codes, list_);
     partOffsets_.resize(bricks + 1);

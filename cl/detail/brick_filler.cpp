@@ -3,16 +3,12 @@
 // the other.
 #include "cl/detail/brick_filler.h"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <optional>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,11 +18,11 @@
 #include "cl/detail/bins.h"
 #include "cl/detail/enqueue.h"
 #include "cl/detail/host_blocks.h"
+#include "cl/detail/host_transfer.h"
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/mapped_buffer.h"
 #include "cl/detail/memory.h"
 #include "cl/detail/queue_guard.h"
-#include "cl/detail/staging.h"
 #include "cl/detail/timing.h"
 #include "sdf/base/bit_orders.h"
 #include "sdf/base/progress.h"
@@ -39,8 +35,7 @@ extern const char* const double_layer_cl;
 
 namespace {
 
-constexpr std::size_t blocksPerTask = 16;  // blocks that the host receives at once
-constexpr std::uint64_t scratchPart = 8;   // maximum fraction of the budget: 1 / scratchPart
+constexpr std::uint64_t scratchPart = 8;  // maximum fraction of the budget: 1 / scratchPart
 /// The smallest cells for grouping pieces, and the maximum distance of a brick's samples beyond its reach [voxels].
 constexpr float minCellSide = 1.1f, aroundBrick = 3;
 /// Sizes in the kernels [bytes]: Piece of pieces.cl, Member and the columns of Groups in groups.cl, and the columns of
@@ -68,13 +63,6 @@ struct BrickBatch {
     std::optional<MappedBuffer> results;
 };
 
-// The results of a batch on the host.
-struct HostResults {
-    const glm::ivec3* origins;
-    const float* distances;
-    const std::int32_t* triangles;
-};
-
 class BrickFill {
   public:
     BrickFill(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep);
@@ -88,15 +76,6 @@ class BrickFill {
     void finish(BrickBatch& batch);
     void keepOnDevice(BrickBatch& batch, std::size_t blocks);
     void passToHost(BrickBatch& batch, std::size_t blocks);
-    void passToHost(const HostResults& results, std::size_t blocks);
-    // Blocks on their way to the host.
-    struct Download {
-        HostResults results{};
-        std::size_t blocks = 0;
-        cl::Event done{};
-    };
-    Download enqueueDownload(BrickBatch& batch, std::size_t first, std::size_t blocks);
-    void download(BrickBatch& batch, std::size_t blocks);
 
     template <class... Arguments>
     void enqueue(const cl::CommandQueue& queue, const char* name, std::size_t groups, const Arguments&... arguments) {
@@ -119,24 +98,15 @@ class BrickFill {
     std::size_t scratchGroups_ = 0;
     cl_uint scratchCells_ = 0;
     std::optional<BatchPlan> plan_;
-    std::optional<Staging> staging_;  // if host and device share no memory
-    std::size_t nextHalf_ = 0;
+    HostTransfer toHost_;
     std::array<BrickBatch, batchesInFlight> batches_;
     std::vector<glm::ivec3> open_;  // blocks that the host fills
     QueueGuard guard_;              // of the device's queue
 };
 
-// Blocks that fit into a half of the staging memory, with the gaps that align their arrays.
-std::size_t blocksPerDownload(bool withTriangles) {
-    const ResultLayout one(1, withTriangles);
-    const std::size_t each =
-        2 * sizeof(glm::ivec3) + blockVoxels * (sizeof(float) + (withTriangles ? sizeof(cl_int) : 0));
-    return (Staging::halfBytes - one.end) / each;
-}
-
 // The maximum distance between a voxel and a triangle that affects it. The cube of the paper extends beyond its ball.
 float reachOf(const FillJob& job) {
-    if (job.options.method != Method::doubleLayer) return job.mesh.reach;
+    if (job.options.method != Method::doubleLayer) return job.input.reach;
     return job.layers.reach * (job.layers.cube > 0 ? std::sqrt(3.f) : 1.f);
 }
 
@@ -150,7 +120,7 @@ std::uint64_t sampleCells(const BrickGrid& grid) {
 
 BatchMode modeOf(const DeviceImpl& device, const OpenclOptions& options, const FillJob& job) {
     const bool gpuMapping = wantsGroups(device, options.mapping);
-    return {gpuMapping, job.options.method == Method::doubleLayer && !gpuMapping, job.mesh.triangles};
+    return {gpuMapping, job.options.method == Method::doubleLayer && !gpuMapping, job.input.triangles};
 }
 
 BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep)
@@ -164,13 +134,14 @@ BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const Fil
       program_(buildProgram(device, doubleLayer_ ? double_layer_cl : exact_cl,
                             commonBuildOptions(device, mode_.gpuMapping, mode_.triangles) +
                                 (doubleLayer_ && job.layers.cube > 0 ? " -D PAPER_CUBE=1" : ""))),
+      toHost_(device, job.input, timing_),
       guard_(device.queue) {
     const float reach = reachOf(job);
     if (mode_.fillsBricks)
         orders_ =
             memory_.upload(bitOrders.data(), sizeof bitOrders, batchPurpose, timing_.event(Timing::Command::upload));
     bins_.emplace(device, program_, memory_, job, reach, doubleLayer_ ? reach : reach + 1, mode_.gpuMapping, timing_);
-    job.mesh.progress.begin(bins_->bricks());
+    job.input.progress.begin(bins_->bricks());
     for (BrickBatch& batch : batches_) {
         batch.queue = cl::CommandQueue(device.context, device.device, CL_QUEUE_PROFILING_ENABLE);
         batch.next = memory_.allocate(sizeof(cl_uint), batchPurpose);
@@ -237,7 +208,7 @@ void BrickFill::enqueueKernels(BrickBatch& batch, std::size_t first) {
                 batch.scratch, scratchCells_, b.ofBricks, batch.next);
         enqueue(batch.queue, "fillBlocks", batch.size.blocks, bins.points(), bins.triangles(), bins.grid(),
                 bins.cellOfBrick(), firstBrick, b.parts, b.sorted, b.columns, b.begins, stride, b.ofBricks,
-                cl_int(job_.mesh.sign), b.origins, b.distances, triangles, b.open, b.counts);
+                cl_int(job_.input.sign), b.origins, b.distances, triangles, b.open, b.counts);
     }
 }
 
@@ -268,19 +239,19 @@ void BrickFill::finish(BrickBatch& batch) {
     batch.counted.wait();
     if (batch.results) std::memcpy(&batch.counts, batch.results->data(), sizeof batch.counts);
     const std::size_t blocks = batch.counts.filledBlocks, open = batch.counts.openBlocks;
-    if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.counts.conflicts;
+    if (job_.input.conflicts) *job_.input.conflicts += batch.counts.conflicts;
     if (open > 0) {
         const std::size_t before = open_.size();
         open_.resize(before + open);
         batch.queue.enqueueReadBuffer(batch.buffers.open, CL_TRUE, 0, open * sizeof(glm::ivec3), &open_[before],
                                       nullptr, timing_.event(Timing::Command::download));
     }
-    job_.mesh.progress.poll();
+    job_.input.progress.poll();
     if (keep_)
         keepOnDevice(batch, blocks);
     else
         passToHost(batch, blocks);
-    for (std::size_t brick = 0; brick < batch.size.bricks; ++brick) job_.mesh.progress.advance();
+    for (std::size_t brick = 0; brick < batch.size.bricks; ++brick) job_.input.progress.advance();
     batch.size = {};
 }
 
@@ -294,69 +265,10 @@ void BrickFill::keepOnDevice(BrickBatch& batch, std::size_t blocks) {
 }
 
 void BrickFill::passToHost(BrickBatch& batch, std::size_t blocks) {
-    const BatchBuffers& b = batch.buffers;
-    if (batch.results) {
-        const ResultLayout layout(b.capacity.blocks, mode_.triangles);
-        const std::byte* all = batch.results->data();
-        passToHost(HostResults{reinterpret_cast<const glm::ivec3*>(all + layout.origins),
-                               reinterpret_cast<const float*>(all + layout.distances),
-                               reinterpret_cast<const std::int32_t*>(all + layout.triangles)},
-                   blocks);
-        batch.results.reset();
-        return;
-    }
-    download(batch, blocks);
-}
-
-// Enqueues the download of some blocks to a half of the staging memory.
-BrickFill::Download BrickFill::enqueueDownload(BrickBatch& batch, std::size_t first, std::size_t blocks) {
-    const std::span<std::byte> to = staging_->half(nextHalf_++);
-    const ResultLayout layout(blocks, mode_.triangles);
-    Download download{{reinterpret_cast<const glm::ivec3*>(to.data() + layout.origins),
-                       reinterpret_cast<const float*>(to.data() + layout.distances),
-                       reinterpret_cast<const std::int32_t*>(to.data() + layout.triangles)},
-                      blocks,
-                      {}};
-    const auto read = [&](const cl::Buffer& from, std::uint64_t at, std::size_t each) {
-        batch.queue.enqueueReadBuffer(from, CL_FALSE, first * each, blocks * each, to.data() + at, nullptr,
-                                      &download.done);
-        timing_.keep(Timing::Command::download, download.done);
-    };
-    const BatchBuffers& b = batch.buffers;
-    read(b.origins, layout.origins, sizeof(glm::ivec3));
-    read(b.distances, layout.distances, blockVoxels * sizeof(float));
-    if (mode_.triangles) read(b.triangles, layout.triangles, blockVoxels * sizeof(cl_int));
-    batch.queue.flush();
-    return download;
-}
-
-// Passes blocks to the host as they arrive.
-void BrickFill::download(BrickBatch& batch, std::size_t blocks) {
-    if (!staging_) staging_.emplace(device_);
-    const auto next = [&](std::size_t first) {
-        const std::size_t count = std::min(blocks - first, blocksPerDownload(mode_.triangles));
-        return count > 0 ? enqueueDownload(batch, first, count) : Download{};
-    };
-    Download arriving = next(0);
-    for (std::size_t done = 0; done < blocks;) {
-        const Download arrived = std::exchange(arriving, next(done + arriving.blocks));
-        arrived.done.wait();
-        passToHost(arrived.results, arrived.blocks);
-        done += arrived.blocks;
-    }
-}
-
-void BrickFill::passToHost(const HostResults& results, std::size_t blocks) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, blocksPerTask), [&](const auto& range) {
-        job_.mesh.progress.poll();
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            if (results.origins[i].x == noBlock) continue;
-            const auto values = [&](const auto* all) { return std::span(all + i * blockVoxels, blockVoxels); };
-            job_.mesh.sink({{results.origins + i, 1},
-                            values(results.distances),
-                            mode_.triangles ? values(results.triangles) : std::span<const std::int32_t>()});
-        }
-    });
+    const BatchBuffers& buffers = batch.buffers;
+    if (!batch.results) return toHost_.download(batch.queue, buffers, blocks);
+    toHost_.pass(batch.results->data(), ResultLayout(buffers.capacity.blocks, mode_.triangles), blocks);
+    batch.results.reset();
 }
 
 OpenclTimes BrickFill::run() {

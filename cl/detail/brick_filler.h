@@ -5,7 +5,6 @@
 #pragma once
 
 #include <functional>
-#include <limits>
 
 #include <bilayer/cl/filler.h>
 #include "cl/detail/program.h"
@@ -22,8 +21,5 @@ using DeviceSink = std::function<void(const cl::Buffer& origins, const cl::Buffe
 /// @return the times of the fill
 OpenclTimes fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job,
                          const DeviceSink& keep = {});
-
-/// The x of the origin of an empty slot.
-inline constexpr int noBlock = std::numeric_limits<int>::min();
 
 }  // namespace bilayer::detail

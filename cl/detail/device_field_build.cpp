@@ -120,7 +120,7 @@ DeviceFieldBuilder::DeviceFieldBuilder(const Device& device, const OpenclOptions
       memory_(memory),
       job_(job),
       gpuMapping_(wantsGroups(device_, options.mapping)),
-      widths_{job.options.exteriorWidthVoxels, job.options.interiorWidthVoxels, job.mesh.voxelSize},
+      widths_{job.options.exteriorWidthVoxels, job.options.interiorWidthVoxels, job.input.voxelSize},
       timing_(options.profile),
       program_(buildProgram(device_, field_build_cl, commonBuildOptions(device_, gpuMapping_))),
       summary_(memory.allocate(sizeof(Summary), fieldPurpose)),
@@ -129,7 +129,7 @@ DeviceFieldBuilder::DeviceFieldBuilder(const Device& device, const OpenclOptions
 BuiltDeviceField DeviceFieldBuilder::run() {
     const Summary none;
     device_.queue.enqueueWriteBuffer(summary_, CL_TRUE, 0, sizeof none, &none);
-    MeshJob mesh = job_.mesh;
+    MeshJob mesh = job_.input;
     mesh.sink = [&](const FilledBlocks& blocks) {
         const std::lock_guard lock(mutex_);
         hostOrigins_.insert(hostOrigins_.end(), blocks.origins.begin(), blocks.origins.end());
@@ -223,9 +223,9 @@ void DeviceFieldBuilder::placeBlocks() {
 }
 
 void DeviceFieldBuilder::countConflicts() {
-    if (!job_.mesh.conflicts) return;
+    if (!job_.input.conflicts) return;
     enqueueBlocks("countConflicts", entries(), KernelFrame(layout_.frame), layout_.directory, layout_.values, summary_);
-    *job_.mesh.conflicts += std::size_t(readSummary().conflicts);
+    *job_.input.conflicts += std::size_t(readSummary().conflicts);
 }
 
 void DeviceFieldBuilder::computeClearances() {
@@ -251,7 +251,7 @@ void checkJob(const FillJob& job) {
     if (job.options.method == Method::prism)
         throw std::invalid_argument(
             "a DeviceField cannot be built by the method prism: build a level set and upload that");
-    if (!job.mesh.sign)
+    if (!job.input.sign)
         throw std::invalid_argument(
             "a field that stays on the device takes its signs from normals; those of this mesh contradict each other, "
             "or other signs were asked for: build a level set and upload that");

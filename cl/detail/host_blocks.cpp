@@ -13,7 +13,7 @@ void fillOnHost(const FillJob& job, std::vector<glm::ivec3> blocks) {
         return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
     };
     std::sort(blocks.begin(), blocks.end(), before);
-    MeshJob mesh = job.mesh;
+    MeshJob mesh = job.input;
     mesh.wanted = [&](const glm::ivec3& first, int side) {
         if (side == blockSide) return std::binary_search(blocks.begin(), blocks.end(), first, before);
         return std::any_of(blocks.begin(), blocks.end(), [&](const glm::ivec3& block) {

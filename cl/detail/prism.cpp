@@ -282,7 +282,7 @@ void PrismFill::finish(PrismBatch& batch) {
 }  // namespace
 
 OpenclTimes fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job) {
-    const MeshJob& mesh = job.mesh;
+    const MeshJob& mesh = job.input;
     const double voxelsPerUnit = 1.0 / double(mesh.voxelSize);
     const VerticesAcross across(mesh.mesh, mesh.progress);
     const TriangleBins bins = binTriangles(mesh.mesh, job.box, voxelsPerUnit, mesh.reach, &mesh.progress);

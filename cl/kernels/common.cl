@@ -60,7 +60,7 @@ typedef IntLanes UnalignedIntLanes __attribute__((aligned(4)));
 #endif
 #define INLINED inline __attribute__((always_inline))
 
-// The x of the origin of an empty slot: noBlock of cl/detail/brick_filler.h.
+// The x of the origin of an empty slot: noBlock of cl/detail/batch_memory.h.
 #define NO_BLOCK INT_MIN
 
 // Value of all distances beyond reach: farAway of sdf/leaf/blocks.h.

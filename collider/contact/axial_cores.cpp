@@ -15,8 +15,9 @@ namespace {
 
 // Chords of a rim. Each lies within 0.5 % of the radius from its arc, before its points are projected onto the arc.
 constexpr std::uint32_t rimChords = 32;
-// A normal within this of the axis belongs to a flat end.
-constexpr float flatEnd = 0.1f;
+// A normal belongs to a flat end if its part across the axis is at most this, and at most this fraction of that of the
+// side's normals.
+constexpr float maxFlatPart = 0.1f, maxFlatFraction = 0.5f;
 // The normal of an end is its axis up to rounding. Next to the rim, normals are oblique (cosine).
 constexpr float exactlyFlat = 1 - 1e-6f;
 // From this fraction of the half height on, a point on the side is on a rim.
@@ -67,6 +68,8 @@ RevolutionCore::RevolutionCore(int axis, float halfHeight, float lowerRadius, fl
     addRim(-halfHeight, lowerRadius);
     addRim(halfHeight, upperRadius);
     tolerance_ = tolerance(growth);
+    const float sidePart = 2 * halfHeight / std::hypot(2 * halfHeight, upperRadius - lowerRadius);
+    minSidePart_ = std::min(maxFlatPart, maxFlatFraction * sidePart);
 }
 
 void RevolutionCore::addRim(float height, float rim) {
@@ -121,7 +124,7 @@ bool RevolutionCore::isFlat(const NearestPoint& nearest) const {
 }
 
 bool RevolutionCore::isOnSide(const NearestPoint& nearest) const {
-    return std::abs(nearest.normal[axis_]) < 1 - flatEnd * flatEnd;
+    return std::abs(nearest.normal[axis_]) < std::sqrt(1 - minSidePart_ * minSidePart_);
 }
 
 bool RevolutionCore::isRound(const NearestPoint& nearest) const {
@@ -133,7 +136,7 @@ glm::vec3 RevolutionCore::supportNear(const NearestPoint& nearest, const glm::ve
     if (!isOnSide(nearest)) return core;
     const float height = core[axis_];
     core[axis_] = out[axis_] = 0;
-    if (const float length = glm::length(out); length > flatEnd) core = (glm::length(core) / length) * out;
+    if (const float length = glm::length(out); length > minSidePart_) core = (glm::length(core) / length) * out;
     core[axis_] = height;
     return core;
 }

@@ -52,6 +52,7 @@ class RevolutionCore : public ConvexCore {
 
     int axis_;
     float halfHeight_, lowerRadius_, upperRadius_, tolerance_;
+    float minSidePart_;  ///< min part across the axis of a normal that does not belong to a flat end
 };
 
 }  // namespace bilayer::detail

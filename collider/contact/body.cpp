@@ -178,15 +178,21 @@ void requireSame(const Bounds& ofMesh, const Bounds& ofBody) {
         refuseBody(fmt::format("'{}' and '{}' are not those of its mesh", entry::lower, entry::upper));
 }
 
-constexpr std::pair<ContactAccuracy, const char*> accuracyNames[] = {{ContactAccuracy::samples, "samples"},
-                                                                     {ContactAccuracy::exactNearFeatures, "edges"},
-                                                                     {ContactAccuracy::exact, "triangles"}};
+constexpr std::pair<ContactAccuracy, const char*> accuracyNames[] = {
+    {ContactAccuracy::samples, "samples"},
+    {ContactAccuracy::exactNearFeatures, "exact-near-features"},
+    {ContactAccuracy::exact, "exact"}};
+// in files of version 0.1
+constexpr std::pair<ContactAccuracy, const char*> formerAccuracyNames[] = {
+    {ContactAccuracy::exactNearFeatures, "edges"}, {ContactAccuracy::exact, "triangles"}};
 
 ContactAccuracy accuracyOf(const std::string& name) {
     for (const auto& [accuracy, itsName] : accuracyNames)
         if (name == itsName) return accuracy;
-    refuseBody(fmt::format("the contact accuracy '{}' is {}; it must be samples, edges or triangles", entry::accuracy,
-                           quotedWord(name)));
+    for (const auto& [accuracy, itsName] : formerAccuracyNames)
+        if (name == itsName) return accuracy;
+    refuseBody(fmt::format("the contact accuracy '{}' is {}; it must be samples, exact-near-features or exact",
+                           entry::accuracy, quotedWord(name)));
 }
 
 // Detects a field that was moved or scaled by another program, without its body.
@@ -210,7 +216,8 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
 void check(const Body& body, const openvdb::FloatGrid& grid) {
     const auto voxel = float(grid.voxelSize()[0]);
     if (!(body.margin >= 0 && body.margin <= maxMargin * voxel))
-        refuseBody(fmt::format("'{}' is {}, and must be 0 to {} voxels", entry::margin, body.margin, maxMargin));
+        refuseBody(fmt::format("'{}' is {} m, and must be from 0 to {} voxels, which are {:g} m", entry::margin,
+                               body.margin, maxMargin, maxMargin * voxel));
     requireWithin(body.points, body.bounds);
     requireWithin(body.bounds, grid);
     if (body.mesh) requireSame(bounds(*body.mesh), body.bounds);
@@ -220,7 +227,8 @@ void check(const Body& body, const openvdb::FloatGrid& grid) {
 }  // namespace
 
 LevelSet withBody(const LevelSet& given, const Body& body) {
-    if (body.points.points().empty()) throw std::invalid_argument("a body has surface points");
+    if (body.points.points().empty())
+        throw std::invalid_argument("the body has no surface points, and needs at least one");
     if (body.mesh) validate(*body.mesh);
     const LevelSet& levelSet = body.filled ? *body.filled : given;
     check(body, *levelSet.grids().distance);

@@ -36,7 +36,7 @@ void refine(Contact& contact, const Placed& a, const Placed& b) {
         const glm::vec3 fromB = *onA - *onB;
         const float distance = glm::length(fromB);
         const glm::vec3 normal = distance > minDirectedDistance * voxel ? fromB / distance : contact.normal;
-        return Contact{*onB, normal, distance, contact.feature, contact.approach, contact.turningRadius};
+        return Contact{*onB, normal, distance, contact.feature, contact.approach, contact.roundingRadius};
     };
     glm::vec3 lastStep(0);  // of the closest point
     for (int i = 0; i < maxIterations; ++i) {

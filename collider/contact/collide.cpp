@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contacts between two bodies: the surface points of either body in the field of the other.
+// Tested by tests/collider/collide.cpp through collide().
 #include <bilayer/collider/contact.h>
 
 #include <algorithm>
@@ -29,11 +30,11 @@ glm::vec3 contactNormal(const Placed& other, const SurfaceSample& sample, const 
     return sample.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * sample.normal;
 }
 
-// A point's plane crosses an edge if the normal of the other surface changes from here to this far beyond by more than
-// 25 degrees (cosine) [voxels]. Samples are too smooth within a voxel of an edge, which is 1.4 voxels from a corner. A
-// voxel above the surface, the normal changes by 25 degrees half a voxel later. Elsewhere samples are better than the
-// normals of facets.
-constexpr float beyondEdge = 2, sharpCosine = 0.9f;
+// A point's plane crosses an edge if the normal of the other surface changes by more than this angle (cosine of 25
+// degrees) up to this distance beyond the point [voxels]. Samples are too smooth within a voxel of an edge, which
+// is 1.4 voxels from a corner. A voxel above the surface, the normal changes by 25 degrees half a voxel later.
+// Elsewhere samples are better than the normals of facets.
+constexpr float sharpCosine = 0.9f, beyondEdge = 2;
 
 // The outward normals of a body's surface near places in the world; zero where they are unknown.
 class NormalsNear {
@@ -42,18 +43,18 @@ class NormalsNear {
     NormalsNear(const Placed& body, float maxDistance)
         : body_(body), surface_(body.collider, false, maxDistance > 0), maxDistance_(maxDistance / body.scale) {}
 
-    // Whether a test holds for the normal near a place: next to an edge for that of the triangles, else for that of
-    // samples. Whether there is an edge is asked for only if the test tells them apart.
+    // Whether a test holds for the normal near a place. Next to an edge that is the normal of the triangles, elsewhere
+    // that of samples. The edge is looked for only if the two give different answers.
     // @param outward  the direction in which the edge is
     // @param test     bool (const glm::vec3& normal)
     template <class Test>
     bool holdsAt(const glm::vec3& place, const glm::vec3& outward, const Test& test) const {
         const glm::vec3 here = at(place, true);
-        const bool holds = test(here);
-        if (holds == test(at(place, false))) return holds;
+        const bool holdsForTriangles = test(here), holdsForSamples = test(at(place, false));
+        if (holdsForTriangles == holdsForSamples) return holdsForSamples;
         const float reach = beyondEdge * body_.scale * surface_.voxelSize();
         const bool isEdge = glm::dot(here, at(place + reach * outward, true)) < sharpCosine;
-        return isEdge == holds;
+        return isEdge ? holdsForTriangles : holdsForSamples;
     }
 
   private:
@@ -98,7 +99,7 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
                                   facesEdge);
     };
     // points are fixed to their body, places between them are not
-    const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {
+    const auto roundingRadiusOf = [](const Placed& body, std::uint32_t feature) {
         return feature < body.collider.data().points().points().size() ? 0.f : -1.f;
     };
     const auto addOf = [&](const Placed& body, const Placed& other, bool isB) {
@@ -109,7 +110,7 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
             const float distance = sample.distance * other.scale;
             contacts.push_back({isB ? place : place - distance * normal, isB ? -normal : normal, distance,
                                 isB ? index | featureOfB : index, sample.approach * other.scale,
-                                turningRadiusOf(body, index)});
+                                roundingRadiusOf(body, index)});
         };
     };
     const std::size_t first = contacts.size();

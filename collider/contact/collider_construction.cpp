@@ -77,8 +77,8 @@ Field fieldOf(const LevelSet& levelSet, const Body& body) {
 Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& options) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("the margin is not finite");
     if (options.margin > maxMargin * levelSet.voxelSize())
-        throw std::invalid_argument(
-            fmt::format("the margin of {:g} is wider than {} voxels", options.margin, maxMargin));
+        throw std::invalid_argument(fmt::format("the margin is {:g} m, and must be at most {} voxels, which are {:g} m",
+                                                options.margin, maxMargin, maxMargin * levelSet.voxelSize()));
     Mesh oriented = orientedMesh(levelSet, std::move(given));
     auto mass = meshOrFieldMass(oriented, levelSet);
     Filled filled = filledMesh(outerSurface(levelSet, std::move(oriented)), levelSet);

@@ -36,7 +36,7 @@ struct ColliderData {
     /// @param exact  use them everywhere if there is a mesh (ContactOptions::exact)
     bool isExactAt(const glm::vec3& point, bool exact = false) const {
         if (exact || body.accuracy == ContactAccuracy::exact) return body.mesh != nullptr;
-        return errorMask.hold(point);
+        return errorMask.isMarked(point);
     }
     const SharpEdges& edges() const { return sharpEdges; }
     /// The hierarchy over the triangles of mesh().

@@ -35,8 +35,8 @@ float maxDisplacement(const CandidateLists::RelativePose& from, const CandidateL
 
 }  // namespace
 
-bool CandidateLists::List::holds(const RelativePose& pose, const glm::vec3& centre, float radius, float voxel,
-                                 float maxSlack) {
+bool CandidateLists::List::keepOrReset(const RelativePose& pose, const glm::vec3& centre, float radius, float voxel,
+                                       float maxSlack) {
     const bool same = isSameSearch(pose, last_);
     const float step = same ? maxDisplacement(last_, pose, centre, radius) : maxSlack;
     last_ = pose;

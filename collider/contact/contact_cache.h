@@ -33,10 +33,10 @@ struct CandidateLists {
         /// @param centre, radius  of a bounding sphere of the body, in its own coordinates [m]
         /// @param voxel           of the other body's field [m]
         /// @param maxSlack        upper limit of the slack [m]
-        bool holds(const RelativePose& pose, const glm::vec3& centre, float radius, float voxel, float maxSlack);
+        bool keepOrReset(const RelativePose& pose, const glm::vec3& centre, float radius, float voxel, float maxSlack);
 
         /// How far the bodies may move before a new list is invalid [m]. 0: they move too fast for a list. Call it
-        /// after holds() has returned false.
+        /// after keepOrReset() has returned false.
         float slack() const { return slack_; }
         const std::vector<std::uint32_t>& points() const { return points_; }
         void add(std::uint32_t point) { points_.push_back(point); }

@@ -32,8 +32,9 @@ struct ReducedContacts {
     /// [m]. The maximum is over tilts of 1/32 rad and shifts of 1/32 of a patch's extent, in directions between those
     /// that the contacts were chosen for.
     float reductionError = 0;
-    /// The same contacts stay valid while the relative displacement of the bodies is below this [m]. Zero if a contact
-    /// approaches: the contacts were then chosen for the motion of that step.
+    /// The same contacts stay valid while the relative displacement of the bodies is below this [m]. Zero if no
+    /// patch had more contacts than are kept, or if a contact approaches: the contacts were then chosen for the motion
+    /// of that step.
     float slack = 0;
 };
 

@@ -44,12 +44,12 @@ class Convex {
     glm::vec3 supportNear(const NearestPoint& nearest, const glm::vec3& direction) const {
         return core_->supportNear(nearest, direction) + nearest.radius * direction;
     }
-    /// The farthest point in a direction of a body that is this one without its growth().
+    /// The farthest point in a direction of the core, which is the body without its growth().
     glm::vec3 support(const glm::vec3& direction) const { return core_->support(direction); }
     /// 0 for spheres, whose radii differ [m].
     float growth() const { return growth_; }
 
-    /// Whether the surface is flat at the nearest point, or is flat where its core is.
+    /// Whether the core is flat at the nearest point.
     bool isFlat(const NearestPoint& nearest) const { return core_->isFlat(nearest); }
     /// Whether the surface is curved and smooth there.
     bool isRound(const NearestPoint& nearest) const { return core_->isRound(nearest); }

@@ -185,7 +185,7 @@ class PointsOnConvex {
             const glm::vec3 place = body_.placeOf(nearest);
             if (auto deeper = descend(nearest, place, local_.at(place))) {
                 deeper->feature = feature;
-                deeper->turningRadius = 0;
+                deeper->roundingRadius = 0;
                 contacts.push_back(*deeper);
                 return;
             }

@@ -141,7 +141,7 @@ std::optional<Contact> FaceContacts::contactBelowCrease(const TriangleFace& face
         const glm::vec3 from = place - face.corners[i];
         if (!(glm::dot(face.outwards[i], from) > onFace * field_.spacing)) continue;
         const glm::vec3 along = face.corners[(i + 1) % 3] - face.corners[i];
-        const glm::vec3 across = glm::normalize(glm::cross(along, *face.neighbours[i]));
+        const glm::vec3 across = glm::normalize(glm::cross(along, *face.outwardsOfOthers[i]));
         const glm::vec3 other = glm::dot(across, point.normal) < 0 ? -across : across;
         const float below = -glm::dot(from, other);
         if (below >= 0) return std::nullopt;
@@ -175,7 +175,7 @@ std::optional<Contact> FaceContacts::contactAtFoot(const glm::vec3& foot, const 
                             rotation * field_.local.relativeMotion().rotation(), isSeparated, facesEdge))
         return std::nullopt;
     setNormal(*contact, field_, normal);
-    contact->turningRadius = -1;  // it stays below the point
+    contact->roundingRadius = -1;  // it stays below the point
     return contact;
 }
 

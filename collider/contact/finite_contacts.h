@@ -17,7 +17,7 @@ inline void removeInfinite(std::vector<Contact>& contacts, std::size_t first) {
     const auto isInfinite = [](const Contact& c) {
         // a product with zero is no number if the factor is not finite
         return 0 * c.position.x + 0 * c.position.y + 0 * c.position.z + 0 * c.normal.x + 0 * c.normal.y +
-                   0 * c.normal.z + 0 * c.distance + 0 * c.approach + 0 * c.turningRadius !=
+                   0 * c.normal.z + 0 * c.distance + 0 * c.approach + 0 * c.roundingRadius !=
                0;
     };
     contacts.erase(std::remove_if(contacts.begin() + std::ptrdiff_t(first), contacts.end(), isInfinite),

@@ -91,9 +91,8 @@ glm::vec3 perpendicularTo(const glm::vec3& unit) {
     return glm::normalize(std::abs(unit.z) > diagonal ? glm::vec3(0, -unit.z, unit.y) : glm::vec3(-unit.y, unit.x, 0));
 }
 
-/// The change of the separations of a patch's contacts when A moves. To first order it is separation + normal . (shift
-/// + rotation x arm), a row of the contact's wrench. Each kind of number has its own column, padded so that processors
-/// handle several contacts at once.
+/// The separations of a patch's contacts after a small motion of A: separation + normal . (shift + rotation x arm), to
+/// first order. Each kind of number has its own column, padded so that processors handle several contacts at once.
 class Separations {
   public:
     Separations(const std::vector<Contact>& contacts, const ContactGroup& group, float rotation)

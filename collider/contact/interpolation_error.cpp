@@ -27,7 +27,7 @@ InterpolationErrorMask::InterpolationErrorMask(const Field& field)
     : field_(std::make_shared<const Field>(field)),
       known_(new std::atomic<std::uint64_t>[wordsPerBlock * field.data().stored]()) {}
 
-bool InterpolationErrorMask::hold(const glm::vec3& point) const noexcept {
+bool InterpolationErrorMask::isMarked(const glm::vec3& point) const noexcept {
     if (!field_) return false;
     const FieldLayout& layout = field_->data();
     const glm::dvec3 local = (glm::dvec3(point) - layout.origin) * layout.perMetre;
@@ -42,13 +42,13 @@ bool InterpolationErrorMask::hold(const glm::vec3& point) const noexcept {
     std::atomic<std::uint64_t>& word = known_[std::ptrdiff_t(block) * wordsPerBlock + index / cellsPerWord];
     std::uint64_t bits = word.load(std::memory_order_relaxed) >> shift;
     if (!(bits & isTested)) {
-        bits = areAt(cell) ? isTested | isInaccurate : isTested;
+        bits = exceedsTolerance(cell) ? isTested | isInaccurate : isTested;
         word.fetch_or(bits << shift, std::memory_order_relaxed);  // another thread may have stored the same result
     }
     return bits & isInaccurate;
 }
 
-bool InterpolationErrorMask::areAt(const glm::ivec3& cell) const noexcept {
+bool InterpolationErrorMask::exceedsTolerance(const glm::ivec3& cell) const noexcept {
     for (int i = 0; i < places * places * places; ++i) {
         const glm::ivec3 place(i / (places * places), i / places % places, i % places);
         if (isOff(glm::dvec3(cell) + (glm::dvec3(place) + 0.5) / double(places))) return true;

@@ -23,10 +23,10 @@ class InterpolationErrorMask {
     explicit InterpolationErrorMask(const Field& field);
 
     /// Whether a point, in field coordinates [m], is in a marked cell.
-    bool hold(const glm::vec3& point) const noexcept;
+    bool isMarked(const glm::vec3& point) const noexcept;
 
   private:
-    bool areAt(const glm::ivec3& cell) const noexcept;
+    bool exceedsTolerance(const glm::ivec3& cell) const noexcept;
     bool isOff(const glm::dvec3& local) const noexcept;
 
     std::shared_ptr<const Field> field_;

@@ -90,8 +90,8 @@ float LocalField::approach(const glm::vec3& point, const glm::vec3& normal, floa
 }
 
 Contact LocalField::contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature,
-                            float approach, float turningRadius) const {
-    return {pose_.toWorld(position), pose_.rotation * normal, distance, feature, approach, turningRadius};
+                            float approach, float roundingRadius) const {
+    return {pose_.toWorld(position), pose_.rotation * normal, distance, feature, approach, roundingRadius};
 }
 
 }  // namespace bilayer::detail

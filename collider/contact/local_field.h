@@ -53,7 +53,7 @@ class LocalField {
     float approach(const glm::vec3& point, const glm::vec3& normal, float margin) const;
 
     Contact contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature,
-                    float approach = 0, float turningRadius = -1) const;
+                    float approach = 0, float roundingRadius = -1) const;
 
   private:
     std::optional<Contact> speculativeContact(const glm::vec3& point, const FieldSample& sample, float radius,

@@ -30,7 +30,7 @@ ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion
                             const ContactOptions& options, std::vector<Contact>& contacts);
 
 /// Collides a field with the two-sided triangles of a mesh or a height field, which is an open surface.
-ContactReport collideTriangles(const TriangleSheet& sheet, const Pose& pose, const Motion& motion, const Placed& field,
-                               const ContactOptions& options, std::vector<Contact>& contacts);
+ContactReport collideTriangles(const OpenSurface& openSurface, const Pose& pose, const Motion& motion,
+                               const Placed& field, const ContactOptions& options, std::vector<Contact>& contacts);
 
 }  // namespace bilayer::detail

@@ -22,7 +22,7 @@ class NearbyTriangles {
     NearbyTriangles(const ProbedField& field, const Pose& inField) : field_(field), inField_(inField) {}
 
     /// @param corners  in the axes of the mesh [m]
-    /// @param id       as TriangleSheet passes it
+    /// @param id       as OpenSurface passes it
     void add(const Triangle& corners, std::uint64_t id);
 
     /// Finds which triangles share edges and vertices, after all have been collected.

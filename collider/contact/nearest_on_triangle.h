@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The distance of a point from a triangle.
+// The point of a triangle nearest to a point.
 // Tested by tests/bullet/convex.cpp through Convex.
 #pragma once
 

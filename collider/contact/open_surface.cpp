@@ -199,10 +199,10 @@ SharpFeatures sharpFeaturesOf(std::span<const Triangle> triangles) {
     return sharp;
 }
 
-std::vector<Triangle> trianglesAlong(const TriangleSheet& sheet, std::span<const glm::vec3> path, float radius) {
+std::vector<Triangle> trianglesAlong(const OpenSurface& openSurface, std::span<const glm::vec3> path, float radius) {
     std::set<std::array<float, 9>> passed;
     std::vector<Triangle> triangles;
-    const TriangleSheet::Visitor add = [&](const Triangle& triangle, std::uint64_t) {
+    const OpenSurface::Visitor add = [&](const Triangle& triangle, std::uint64_t) {
         const auto& [a, b, c] = triangle;
         if (!isFinite(triangle)) return;
         if (passed.insert({a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z}).second) triangles.push_back(triangle);
@@ -213,7 +213,7 @@ std::vector<Triangle> trianglesAlong(const TriangleSheet& sheet, std::span<const
         for (float k = 0; k < intervals; ++k) {
             const glm::vec3 from = glm::mix(path[i], path[i + 1], k / intervals),
                             to = glm::mix(path[i], path[i + 1], (k + 1) / intervals);
-            sheet.visit({glm::min(from, to) - radius, glm::max(from, to) + radius}, add);
+            openSurface.visit({glm::min(from, to) - radius, glm::max(from, to) + radius}, add);
         }
     }
     return triangles;

@@ -81,7 +81,7 @@ struct SharpFeatures {
 };
 SharpFeatures sharpFeaturesOf(std::span<const Triangle> triangles);
 
-/// The triangles of a sheet that a sphere may touch along a polyline, each once.
-std::vector<Triangle> trianglesAlong(const TriangleSheet& sheet, std::span<const glm::vec3> path, float radius);
+/// The triangles of an open surface that a sphere may touch along a polyline, each once.
+std::vector<Triangle> trianglesAlong(const OpenSurface& openSurface, std::span<const glm::vec3> path, float radius);
 
 }  // namespace bilayer::detail

@@ -26,9 +26,11 @@ namespace {
 // Depth of the test points inside their own body [voxels]. Contacts handle shallower penetration, so that a body that
 // slides along another one is not stopped.
 constexpr float testDepth = 0.25f;
-// Maximum depth of a surface point below the plane where its test point enters, and of a point that starts inside
-// beyond its initial depth [voxels].
-constexpr float maxDeepening = 0.1f, maxDepth = testDepth + maxDeepening;
+// A point that starts inside may get this much deeper in a step [voxels]. The steps add up, so that it may be less from
+// this depth on, where a body still slides on at its depth.
+constexpr float maxDeepening = 0.1f, minDeepening = 0.02f, maxStartDepth = 0.45f;
+// Maximum depth of a surface point below the plane where its test point enters [voxels].
+constexpr float maxDepth = testDepth + maxDeepening;
 // A stopped body goes back by this much at most from where the test point entered [voxels]. An oblique path touches far
 // before it enters. Where the surface bends in between, the next step's contacts would miss the surface that the body
 // met, and it would be stopped in the same place again.
@@ -36,14 +38,15 @@ constexpr float maxReturn = 0.5f;
 // A body that goes back to less than this from its start stops where the test point enters [voxels]. At its start,
 // contacts would miss the surface ahead, and it would be stopped there in each step.
 constexpr float minAdvance = 0.05f;
-// Beyond a convex edge, the surface is below the plane where a point entered. A point that is less than the first value
-// below the plane is as deep as the nearest surface above or below it says, if that is less than the first value away
-// and faces the same way (cosine) [voxels].
-constexpr float maxPlaneDepth = 1, minSimilarCosine = 0.5f;
-// An open surface that cuts a body up to this far below a test point has been passed by the point [voxels].
+// Beyond a convex edge, the surface is below the plane where a point entered. So the depth of a point is measured to
+// the nearest surface above or below it instead, if that and the plane are at most this far away [voxels],
+constexpr float maxPlaneDepth = 1;
+// and if that surface faces the same way as the plane (cosine of the angle between the normals).
+constexpr float minSimilarCosine = 0.5f;
+// A test point has passed an open surface that cuts its body at most this far below the point [voxels].
 constexpr float maxPassedDepth = 1;
-// ... where the body is thick enough: down there its surface is at least this far away. Otherwise the surface may just
-// touch the other side of a thin body [voxels].
+// That holds only where the body is thick: at that depth, its own surface is at least this far away [voxels]. The open
+// surface may else just touch the other side of a thin body.
 constexpr float minCoreDepth = 0.35f;
 // A point that passes an open surface with its body ahead of it leaves that surface: a point enters only where the
 // cosine of the angle between its normal and that of the surface is at most this. The margin is for faces that pass
@@ -134,48 +137,72 @@ class PointSweep {
     const Penetration& first() const { return first_; }
 
   private:
+    /// What is followed in place of a rounded point: a point or a sphere that is `testDepth` inside the body's surface.
+    struct TestPoint {
+        glm::vec3 place;  ///< in the body's coordinates
+        float radius;
+        float radiusReduction, inwardOffset;  ///< compared with the rounded point; their sum is `testDepth`
+
+        /// The depth of the test point where the rounded point touches a surface.
+        /// @param facing  cosine of the angle between the normals of the body and of the surface
+        float touchingDepth(float facing) const { return std::min(inwardOffset * facing, 0.f) - radiusReduction; }
+    };
+    TestPoint testPointOf(const RoundedPoint& rounded) const {
+        const float radius = std::max(scale_ * rounded.radius - testDepth * voxel_, 0.f),
+                    reduction = scale_ * rounded.radius - radius, offset = testDepth * voxel_ - reduction;
+        return {rounded.place - offset / scale_ * rounded.outward, radius, reduction, offset};
+    }
+
     void follow(const RoundedPoint& rounded) {
-        const auto& [point, outward, radius] = rounded;
-        const float smaller = std::max(scale_ * radius - testDepth * voxel_, 0.f), shrunk = scale_ * radius - smaller,
-                    inward = testDepth * voxel_ - shrunk;
-        const glm::vec3 inner = point - inward / scale_ * outward;
-        // a point that starts inside may move on at its depth
-        const auto out = wayOut(inner, outward, smaller);
-        if (!out) return;
-        const glm::vec3 offset = *out;
-        const bool startsInside = offset != glm::vec3(0);
-        glm::vec3 from = transforms_.front()(inner) + offset;
+        const TestPoint point = testPointOf(rounded);
+        // a point that starts inside is followed from the surface on, so that it may move on at its depth
+        const auto depenetration = depenetrationOf(point.place, rounded.outward, point.radius);
+        if (!depenetration) return;
+        const glm::vec3 offset = *depenetration;
+        glm::vec3 from = transforms_.front()(point.place) + offset;
         std::optional<SurfaceEntry> entered;
         float stop = 0;  // where the body stops if the point that has entered gets too deep
         for (std::size_t i = 0; i + 1 < transforms_.size() && transforms_[i].time < first_.time; ++i) {
-            const glm::vec3 to = transforms_[i + 1](inner) + offset;
-            const glm::vec3 ahead = transforms_[i].rotated(outward);
+            const glm::vec3 to = transforms_[i + 1](point.place) + offset;
+            const glm::vec3 ahead = transforms_[i].rotated(rounded.outward);
             const bool wasInside = entered.has_value();
-            if (!wasInside) {
-                entered = surface_.entry(from, to, smaller);
-                if (entered && leaves(ahead, *entered)) entered.reset();
-            }
+            if (!wasInside) entered = entryOf(from, to, ahead, point.radius);
             if (entered) {
-                // where the point itself touches, and where it is too deep
-                const float touching = std::min(inward * glm::dot(ahead, entered->normal), 0.f) - shrunk,
-                            limit = startsInside ? maxDeepening * voxel_ : maxDepth * voxel_ + touching;
-                const Chord chord{glm::distance(from, to), depthBelow(*entered, from, smaller),
-                                  depthBelow(*entered, to, smaller)};
-                if (!wasInside) {
-                    const float part = stoppingPart(chord, touching, i == 0);
-                    stop = glm::mix(transforms_[i].time, transforms_[i + 1].time, part);
+                const float touching = point.touchingDepth(glm::dot(ahead, entered->normal));
+                if (!wasInside) stop = stoppingTime(i, chordOf(*entered, from, to, point.radius), touching);
+                const float limit = offset == glm::vec3(0) ? maxDepth * voxel_ + touching : deepening(offset) * voxel_;
+                if (getsDeeper(*entered, to, point.radius, limit)) {
+                    first_ = {std::min(stop, first_.time), entered->position - offset, entered->normal};
+                    return;
                 }
-                if (chord.after > limit) {
-                    if (const auto around = surfaceAround(to, chord.after, *entered, smaller)) entered = around;
-                    if (depthBelow(*entered, to, smaller) > limit) {
-                        first_ = {std::min(stop, first_.time), entered->position - offset, entered->normal};
-                        return;
-                    }
-                }
-                if (depthBelow(*entered, to, smaller) < 0) entered.reset();
+                if (depthBelow(*entered, to, point.radius) < 0) entered.reset();
             }
             from = to;
         }
+    }
+
+    /// How much deeper a point may get that starts inside [voxels].
+    /// @param offset  from its test point to the surface
+    float deepening(const glm::vec3& offset) const {
+        const float depth = glm::length(offset) / voxel_ + testDepth;
+        return std::clamp(maxStartDepth - depth, minDeepening, maxDeepening);
+    }
+
+    /// Where a test point enters the surface on a chord.
+    /// @param ahead  the outward normal of its body
+    std::optional<SurfaceEntry> entryOf(const glm::vec3& from, const glm::vec3& to, const glm::vec3& ahead,
+                                        float radius) const {
+        const auto entry = surface_.entry(from, to, radius);
+        return entry && leaves(ahead, *entry) ? std::nullopt : entry;
+    }
+
+    /// Whether a test point that has entered is deeper than this. If it is, takes the surface around it, if that is
+    /// known, in place of the plane where it entered.
+    bool getsDeeper(SurfaceEntry& entered, const glm::vec3& point, float radius, float limit) const {
+        const float depth = depthBelow(entered, point, radius);
+        if (!(depth > limit)) return false;
+        if (const auto around = surfaceAround(point, depth, entered, radius)) entered = *around;
+        return depthBelow(entered, point, radius) > limit;
     }
 
     /// How deep a sphere is below the tangent plane of the place where it entered.
@@ -192,15 +219,20 @@ class PointSweep {
         float partAt(float depth) const { return after > before ? (depth - before) / (after - before) : 0; }
     };
 
-    /// Where on a chord a body stops whose test point enters on it: where the point itself touches, if that is not far
-    /// back. Before the chord the path has another direction.
-    /// @param touching  depth of the test point there
-    float stoppingPart(const Chord& chord, float touching, bool isFirst) const {
+    static Chord chordOf(const SurfaceEntry& entry, const glm::vec3& from, const glm::vec3& to, float radius) {
+        return {glm::distance(from, to), depthBelow(entry, from, radius), depthBelow(entry, to, radius)};
+    }
+
+    /// When a body stops whose test point enters on a chord: when the point itself touches, if that is not far back.
+    /// Before the chord the path has another direction.
+    /// @param touching  depth of the test point then
+    float stoppingTime(std::size_t chordIndex, const Chord& chord, float touching) const {
         const float entering = chord.partAt(0),
                     part = std::max(chord.partAt(touching), entering - maxReturn * voxel_ / chord.length);
         // there is too little path to go back on: the body stops where the point enters
-        const bool isAtStart = isFirst && part * chord.length < minAdvance * voxel_;
-        return std::clamp(isAtStart ? entering : part, 0.f, 1.f);
+        const bool isAtStart = chordIndex == 0 && part * chord.length < minAdvance * voxel_;
+        return glm::mix(transforms_[chordIndex].time, transforms_[chordIndex + 1].time,
+                        std::clamp(isAtStart ? entering : part, 0.f, 1.f));
     }
 
     /// The surface around a point that is below the plane of its entry; nothing if that is unknown.
@@ -222,9 +254,9 @@ class PointSweep {
     /// The displacement to the surface of a point that starts inside; zero if it starts outside, nothing if unknown.
     /// @param inner    the test point
     /// @param outward  normal of its body
-    std::optional<glm::vec3> wayOut(const glm::vec3& inner, const glm::vec3& outward, float radius) const {
+    std::optional<glm::vec3> depenetrationOf(const glm::vec3& inner, const glm::vec3& outward, float radius) const {
         if constexpr (Surface::isOpen) {
-            return backThroughSheet(inner, outward);
+            return backThroughOpenSurface(inner, outward);
         } else {
             const glm::vec3 from = transforms_.front()(inner);
             if (surface_.entry(from, from, radius)) return surface_.depenetration(from, radius);
@@ -234,7 +266,7 @@ class PointSweep {
 
     /// The displacement to an open surface of a point that has passed it, so that the surface cuts the body right below
     /// the point. Zero if it does not.
-    glm::vec3 backThroughSheet(const glm::vec3& inner, const glm::vec3& outward) const {
+    glm::vec3 backThroughOpenSurface(const glm::vec3& inner, const glm::vec3& outward) const {
         const glm::vec3 core = inner - maxPassedDepth * voxel_ / scale_ * outward;
         const glm::vec3 from = transforms_.front()(core), to = transforms_.front()(inner);
         const auto cut = surface_.entry(from, to, 0);
@@ -286,14 +318,14 @@ float voxelOf(const SweptShape& body) {
     return collider ? body.scale * collider->field().voxelSize() : std::numeric_limits<float>::infinity();
 }
 
-/// The sharp features of a sheet's triangles that a collider may meet.
-SharpFeatures sharpFeaturesOn(const TriangleSheet& sheet, float scale, const SweptShape& field,
-                              const std::vector<StepTransform>& intoSheet) {
+/// The sharp features of an open surface that a collider may meet.
+SharpFeatures sharpFeaturesOn(const OpenSurface& openSurface, float scale, const SweptShape& field,
+                              const std::vector<StepTransform>& intoOpenSurface) {
     const Bounds& bounds = field.shape.collider()->bounds();
     std::vector<glm::vec3> path;
-    for (const StepTransform& transform : intoSheet) path.push_back(transform(bounds.centre()));
+    for (const StepTransform& transform : intoOpenSurface) path.push_back(transform(bounds.centre()));
     const float radius = 0.5f * field.scale / scale * glm::length(bounds.size());
-    return sharpFeaturesOf(trianglesAlong(sheet, path, radius));
+    return sharpFeaturesOf(trianglesAlong(openSurface, path, radius));
 }
 
 /// The first penetration of the points of one shape into the surface of another, in world coordinates.
@@ -309,8 +341,9 @@ Penetration firstOf(const SweptShape& points, const SweptShape& other, float vox
             sweep.follow(*collider);
         else if constexpr (std::is_same_v<decltype(surface), const FieldSurface>) {
             if (const auto* convex = std::get_if<Convex>(&shape)) sweep.follow(*convex, ownVoxel);
-            if (const auto* sheet = std::get_if<TriangleSheet>(&shape))
-                sweep.follow(sharpFeaturesOn(*sheet, points.scale, other, stepTransforms(other, points)), ownVoxel);
+            if (const auto* openSurface = std::get_if<OpenSurface>(&shape))
+                sweep.follow(sharpFeaturesOn(*openSurface, points.scale, other, stepTransforms(other, points)),
+                             ownVoxel);
         }
         return sweep.first();
     };

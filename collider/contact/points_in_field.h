@@ -40,7 +40,8 @@ class PointsInField {
           reach_(options.margin / other.scale) {
         const Bounds &bounds = body.collider.bounds(), &otherBounds = other.collider.bounds();
         centre_ = bounds.centre(), radius_ = 0.5f * glm::length(bounds.size());
-        // contacts are in the boxes of both bodies: so the points of either approach, or those of neither
+        // A contact lies in the boxes of both bodies. The smaller of the two bounds of the displacement therefore
+        // decides for the points of either body.
         speculative_ =
             std::min(maxDisplacement(transform_(centre_), body_.scale * radius_ / other_.scale),
                      maxDisplacement(otherBounds.centre(), 0.5f * glm::length(otherBounds.size()))) > maxReach(range);
@@ -57,7 +58,7 @@ class PointsInField {
             std::min(voxel, (field().exteriorWidth() - reach_) / maxInterpolantSlope - rounding * voxel);
         const CandidateLists::RelativePose pose{body_.collider.id(), other_.collider.id(), reach_, transform_.linear,
                                                 transform_.shift};
-        if (candidates->holds(pose, centre_, radius_, voxel, maxSlack))
+        if (candidates->keepOrReset(pose, centre_, radius_, voxel, maxSlack))
             visitListed(*candidates, report, found);
         else if (candidates->slack() > 0)
             visitAndList(*candidates, report, found);

@@ -70,12 +70,12 @@ float PredictedContacts::maxSeconds(const SteppedBody& body, const glm::vec3& pl
 
 std::optional<PredictedContact> PredictedContacts::predict(const Contact& contact) const {
     // contacts that touch stay where they are: behind a wheel, they would push it on
-    if (contact.turningRadius < 0 || contact.distance <= 0) return std::nullopt;
+    if (contact.roundingRadius < 0 || contact.distance <= 0) return std::nullopt;
     const bool isOfB = contact.feature & featureOfB;
     const SteppedBody &own = isOfB ? b_ : a_, &other = isOfB ? a_ : b_;
     const glm::vec3 outward = isOfB ? -contact.normal : contact.normal;
     // the centre of the sphere that a vertex is rounded by rotates
-    const float radius = contact.turningRadius, height = contact.distance + radius;
+    const float radius = contact.roundingRadius, height = contact.distance + radius;
     const glm::vec3 middle = contact.position + (isOfB ? radius : height) * outward;
     const glm::vec3 arm = middle - own.centre, otherArm = middle - other.centre;
 

@@ -68,13 +68,13 @@ ContactReport detail::collideShape(const PlacedShape& a, const Placed& b, const 
         report = collideHalfSpace(inWorld(*solid, pose), motion.about(pose.position, glm::vec3(0)), field, options,
                                   contacts);
     else
-        report = collideTriangles(std::get<TriangleSheet>(shape), pose, motion, field, options, contacts);
+        report = collideTriangles(std::get<OpenSurface>(shape), pose, motion, field, options, contacts);
     for (std::size_t i = first; i < contacts.size(); ++i) {
         Contact& contact = contacts[i];
         contact.position *= units.length;
         contact.distance *= units.length;
         contact.approach *= units.length;
-        if (contact.turningRadius > 0) contact.turningRadius *= units.length;
+        if (contact.roundingRadius > 0) contact.roundingRadius *= units.length;
     }
     return report;
 }

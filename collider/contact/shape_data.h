@@ -20,7 +20,7 @@ struct HalfSpace {
 };
 
 struct ContactShapeData {
-    std::variant<Collider, Convex, HalfSpace, TriangleSheet> shape;
+    std::variant<Collider, Convex, HalfSpace, OpenSurface> shape;
 };
 
 }  // namespace bilayer::detail

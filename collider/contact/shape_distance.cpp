@@ -162,16 +162,16 @@ BodyDistance distanceOf(const HalfSpace& solid, const ShapeAndCollider& bodies, 
 }
 
 /// Asks for triangles in boxes that grow until the nearest one must be among them.
-BodyDistance distanceOf(const TriangleSheet& sheet, const ShapeAndCollider& bodies, double limit,
+BodyDistance distanceOf(const OpenSurface& openSurface, const ShapeAndCollider& bodies, double limit,
                         DistanceStart& start) {
     constexpr float maxReach = 1e30f;
     const double scale = bodies.aToB.scale;
-    const BodyTransform intoSheet(bodies.b.pose, bodies.b.scale, bodies.a.pose, bodies.a.scale);
+    const BodyTransform intoOpenSurface(bodies.b.pose, bodies.b.scale, bodies.a.pose, bodies.a.scale);
     SolidDistance best;
     best.distance = limit;
     const auto search = [&](float reach) {
-        sheet.visit(intoSheet.boxAround(bodies.b.collider.bounds(), reach), [&](const Triangle& triangle,
-                                                                                std::uint64_t) {
+        openSurface.visit(intoOpenSurface.boxAround(bodies.b.collider.bounds(), reach), [&](const Triangle& triangle,
+                                                                                            std::uint64_t) {
             if (!(best.distance > 0)) return;
             const SolidDistance found = nearestTo(triangle, bodies.mesh(), bodies.aToB, best.distance, start.triangleB);
             if (found.found() && found.distance < best.distance) best = found;
@@ -199,7 +199,7 @@ BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const Distance
     const Order order = orderOf(a, b);
     if (order.both) return distance(placed(a), placed(b), options, start);
     const ShapeAndCollider bodies(order.isSwapped ? b : a, order.isSwapped ? a : b);
-    const double limit = std::max(double(options.maxDistance), 0.0) / double(bodies.b.scale);
+    const double limit = searchLimit(options, sizeOf(bodies.b)) / double(bodies.b.scale);
     DistanceStart own;
     if (start) own.triangleB = order.isSwapped ? start->triangleA : start->triangleB;
     const auto& shape = bodies.a.shape.data().shape;
@@ -209,7 +209,7 @@ BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const Distance
     else if (const auto* solid = std::get_if<HalfSpace>(&shape))
         answer = distanceOf(*solid, bodies, limit, own);
     else
-        answer = distanceOf(std::get<TriangleSheet>(shape), bodies, limit, own);
+        answer = distanceOf(std::get<OpenSurface>(shape), bodies, limit, own);
     if (start)
         *start = order.isSwapped ? DistanceStart{own.triangleB, noTriangle} : DistanceStart{noTriangle, own.triangleB};
     return order.isSwapped ? swapped(answer) : answer;

@@ -25,17 +25,17 @@ struct SolidDistance {
     bool found() const { return triangle != noTriangle; }
 };
 
-/// All lengths are those of the mesh's coordinates. The distance is exact to 1e-6 of the sizes of both bodies.
+/// The distance of a mesh from a convex body; 0 if the surface of the mesh meets it, or lies in it. All lengths are
+/// those of the mesh's coordinates. Exact to 1e-6 of the sizes of both bodies.
 /// @param toMesh  maps coordinates of the solid to those of the mesh
 /// @param limit   finds nothing beyond this distance
 /// @param start   a triangle that may be near, or `noTriangle`
-/// The distance of a convex body; 0 if the surface of the mesh meets it, or lies in it.
 SolidDistance nearestTo(const Convex& convex, const MeshTree& mesh, const Similarity& toMesh, double limit,
                         std::uint32_t start);
-/// The height of the lowest vertex over a plane, which may be negative.
+/// The same for a plane: the height of the lowest vertex over it, which may be negative.
 SolidDistance nearestTo(const HalfSpace& solid, const MeshTree& mesh, const Similarity& toMesh, double limit,
                         std::uint32_t start);
-/// The distance of a triangle; 0 if the surface of the mesh meets it.
+/// The same for a triangle; 0 if the surface of the mesh meets it.
 SolidDistance nearestTo(const Triangle& triangle, const MeshTree& mesh, const Similarity& toMesh, double limit,
                         std::uint32_t start);
 

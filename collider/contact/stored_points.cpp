@@ -27,13 +27,13 @@ using Points = openvdb::points::PointDataGrid;
 
 constexpr double pointCell = 4;  // min edge of a point voxel [voxels of the field]; holds a few points
 
-// The usual names of these attributes in other programs.
+// P, N and id are usual in other programs.
 namespace attribute {
 constexpr const char* position = "P";
 constexpr const char* normal = "N";
 constexpr const char* feature = "id";
 constexpr const char* sharp = "sharp";
-constexpr const char* back = "back";
+constexpr const char* inner = "back";  // whether a point is on the inner side of an open surface
 }  // namespace attribute
 
 // The edge of a point voxel is a power of two. OpenVDB stores a point's place within its voxel; it is then a float
@@ -86,7 +86,7 @@ using Handle = openvdb::points::AttributeHandle<Value>;
 void requireValues(const Points::TreeType::LeafNodeType& leaf) {
     leaf.validateOffsets();
     for (const char* name :
-         {attribute::position, attribute::normal, attribute::feature, attribute::sharp, attribute::back})
+         {attribute::position, attribute::normal, attribute::feature, attribute::sharp, attribute::inner})
         if (leaf.constAttributeArray(name).dataSize() < openvdb::Index(leaf.getLastValue()))
             refuseBody(
                 fmt::format("surface points have fewer values of the attribute '{}' than there are points", name));
@@ -103,7 +103,7 @@ SurfacePoints load(const Points& grid) {
         const Handle<Vec3s> normal(leaf->constAttributeArray(attribute::normal));
         const Handle<std::int32_t> feature(leaf->constAttributeArray(attribute::feature));
         const Handle<std::int8_t> sharp(leaf->constAttributeArray(attribute::sharp));
-        const Handle<std::int8_t> back(leaf->constAttributeArray(attribute::back));
+        const Handle<std::int8_t> back(leaf->constAttributeArray(attribute::inner));
         for (auto index = leaf->beginIndexOn(); index; ++index) {
             const openvdb::Vec3d place = index.getCoord().asVec3d() + openvdb::Vec3d(position.get(*index));
             collector.add(feature.get(*index), {toGlm(Vec3s(grid.indexToWorld(place))), toGlm(normal.get(*index)),
@@ -130,7 +130,8 @@ openvdb::GridBase::ConstPtr storePoints(const SurfacePoints& surface, float voxe
                                [](std::size_t i) { return std::int32_t(i); });
     addAttribute<std::int8_t>(*grid, *index, attribute::sharp, points,
                               [&](std::size_t i) { return points[i].isSharp; });
-    addAttribute<std::int8_t>(*grid, *index, attribute::back, points, [&](std::size_t i) { return points[i].isInner; });
+    addAttribute<std::int8_t>(*grid, *index, attribute::inner, points,
+                              [&](std::size_t i) { return points[i].isInner; });
     grid->setName(contactPoints);
     return grid;
 }

@@ -14,6 +14,7 @@
 #include <glm/gtx/norm.hpp>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <tuple>
 
 #include "collider/contact/outer_side.h"
@@ -38,7 +39,7 @@ struct Candidate {
     glm::dvec3 normal;
     double convexity;  // mean sine of the angle by which the surface recedes around the point; 0 on a plane, negative
                        // in a dent
-    bool isInner;      // of an open surface, or on its border
+    bool isInner;      // on the border of an open surface; findInner() decides for the other points
 };
 
 struct Edge {
@@ -243,30 +244,30 @@ std::vector<Candidate> thin(std::vector<Candidate> candidates, double spacing, G
 // The candidates as seen from behind, but for those on borders, where normals are along the surface.
 std::vector<Candidate> backsOf(const std::vector<Candidate>& candidates) {
     std::vector<Candidate> backs;
-    for (const auto& [position, normal, convexity, isInner] : candidates)
-        if (!isInner) backs.push_back({position, -normal, -convexity, true});
+    for (const auto& [position, normal, convexity, onBorder] : candidates)
+        if (!onBorder) backs.push_back({position, -normal, -convexity, false});
     return backs;
 }
 
-// Removes the backs that do not face the outside.
-void keepOutside(std::vector<Candidate>& backs, double spacing, const SurfacePoints::IsOutside& isOutside) {
-    std::vector<char> facesOutside(backs.size());
-    tbb::parallel_for(std::size_t(0), backs.size(), [&](std::size_t i) {
-        facesOutside[i] = isOutside(backs[i].position + thinnestWall * spacing * backs[i].normal);
-    });
+// Removes the candidates for which a test fails.
+template <class Test>
+void keepIf(std::vector<Candidate>& candidates, Test&& test) {
+    std::vector<char> passes(candidates.size());
+    tbb::parallel_for(std::size_t(0), candidates.size(), [&](std::size_t i) { passes[i] = test(candidates[i]); });
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < backs.size(); ++i)
-        if (facesOutside[i]) backs[kept++] = backs[i];
-    backs.resize(kept);
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+        if (passes[i]) candidates[kept++] = candidates[i];
+    candidates.resize(kept);
 }
 
 // Decides which points of open surfaces are inner ones: fronts that see less than their other side, and backs that do
 // not see more than it.
+// @param isOpen  whether the outside is behind a front, too
 template <class IsOpen>
 void findInner(std::vector<Candidate>& fronts, std::vector<Candidate>& backs, const OuterSide& sides, IsOpen&& isOpen) {
     tbb::parallel_for(std::size_t(0), fronts.size(), [&](std::size_t i) {
         Candidate& front = fronts[i];
-        front.isInner = front.isInner || (sides.isInner(front.position, front.normal) && isOpen(front));
+        if (!front.isInner && isOpen(front)) front.isInner = sides.isInner(front.position, front.normal);
     });
     tbb::parallel_for(std::size_t(0), backs.size(),
                       [&](std::size_t i) { backs[i].isInner = !sides.isInner(backs[i].position, -backs[i].normal); });
@@ -277,11 +278,13 @@ std::vector<Candidate> pointsOf(const Mesh& mesh, double spacing, const SurfaceP
     Grid grid(minGap * spacing, 2 * all.size());
     std::vector<Candidate> points = thin(all, spacing, grid);
     if (!isOutside) return points;
+    const auto outsideAt = [&](const Candidate& point, double height) {  // [spacings]
+        return isOutside(point.position + height * spacing * point.normal);
+    };
     std::vector<Candidate> backs = thin(backsOf(all), spacing, grid);
-    keepOutside(backs, spacing, isOutside);
-    findInner(points, backs, OuterSide(mesh, spacing), [&](const Candidate& front) {
-        return isOutside(front.position - thinnestWall * spacing * front.normal);
-    });
+    keepIf(backs, [&](const Candidate& back) { return outsideAt(back, thinnestWall); });
+    findInner(points, backs, OuterSide(mesh, spacing),
+              [&](const Candidate& front) { return outsideAt(front, -thinnestWall); });
     points.insert(points.end(), backs.begin(), backs.end());
     return points;
 }
@@ -327,7 +330,7 @@ void addNode(const std::vector<SurfacePoint>& points, std::vector<PointNode>& no
 
 SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing, const IsOutside& isOutside) {
     if (!(spacing > 0 && std::isfinite(spacing)))
-        throw std::invalid_argument("the spacing must be positive and finite");
+        throw std::invalid_argument("the spacing is " + std::to_string(spacing) + ", and must be positive and finite");
     validate(mesh);
     const Mesh welded = weld(mesh);
     for (const Candidate& point : pointsOf(welded, spacing, isOutside))

@@ -17,7 +17,7 @@ struct SurfacePoint {
     glm::vec3 normal;    ///< outward, of unit length
     bool isSharp;        ///< on a convex edge or vertex, where faces with different normals meet; or on a border
     /// On the inner side or the border of an open surface. Triangles of another body have two sides, too: only the
-    /// outer side, which faces away from the body, tells which of them it comes from. Inner points do not touch them.
+    /// outer side, which faces away from the body, shows which of them it comes from. Inner points do not touch them.
     bool isInner = false;
 };
 

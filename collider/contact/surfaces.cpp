@@ -100,11 +100,11 @@ bool PlaneSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radi
     return std::min(heightOf(from), heightOf(to)) - radius < nearDistance * voxel_;
 }
 
-std::optional<SurfaceEntry> SheetSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+std::optional<SurfaceEntry> TriangleSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
     const glm::vec3 displacement = to - from;
     float part = 1;
     std::optional<SurfaceEntry> first;
-    sheet_.visit({glm::min(from, to), glm::max(from, to)}, [&](const Triangle& triangle, std::uint64_t) {
+    openSurface_.visit({glm::min(from, to), glm::max(from, to)}, [&](const Triangle& triangle, std::uint64_t) {
         const glm::vec3 &a = triangle[0], one = triangle[1] - a, two = triangle[2] - a;
         const glm::vec3 normal = glm::cross(one, two), start = from - a, moment = glm::cross(start, displacement);
         const float along = -glm::dot(displacement, normal);
@@ -118,10 +118,10 @@ std::optional<SurfaceEntry> SheetSurface::entry(const glm::vec3& from, const glm
     return first;
 }
 
-bool SheetSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+bool TriangleSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
     bool found = false;
-    sheet_.visit({glm::min(from, to) - radius, glm::max(from, to) + radius},
-                 [&](const Triangle&, std::uint64_t) { found = true; });
+    openSurface_.visit({glm::min(from, to) - radius, glm::max(from, to) + radius},
+                       [&](const Triangle&, std::uint64_t) { found = true; });
     return found;
 }
 

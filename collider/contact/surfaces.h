@@ -7,7 +7,8 @@
 //   none if unknown. An open surface has no such function;
 // - bool isNear(from, to, radius): whether a sphere may come near on a straight path.
 //
-// Only fields are entered by spheres with a radius, and by points where they are at the start.
+// Only a FieldSurface takes a radius above zero. All surfaces with an inside take a path without length: its point is
+// then tested to be inside.
 // Tested by tests/collider/time_of_impact.cpp through timeOfImpact().
 #pragma once
 
@@ -75,17 +76,17 @@ class PlaneSurface {
     float voxel_;
 };
 
-class SheetSurface {
+class TriangleSurface {
   public:
     static constexpr bool isOpen = true;
 
-    SheetSurface(const TriangleSheet& sheet, float) : sheet_(sheet) {}
+    TriangleSurface(const OpenSurface& openSurface, float) : openSurface_(openSurface) {}
 
     std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
     bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const;
 
   private:
-    const TriangleSheet& sheet_;
+    const OpenSurface& openSurface_;
 };
 
 /// The surface of each kind of shape.
@@ -99,7 +100,7 @@ inline ConvexSurface surfaceOf(const Convex& shape, float voxel) {
 inline PlaneSurface surfaceOf(const HalfSpace& shape, float voxel) {
     return {shape, voxel};
 }
-inline SheetSurface surfaceOf(const TriangleSheet& shape, float voxel) {
+inline TriangleSurface surfaceOf(const OpenSurface& shape, float voxel) {
     return {shape, voxel};
 }
 

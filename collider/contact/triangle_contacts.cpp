@@ -90,7 +90,7 @@ class TriangleProbes {
         const auto normal = normalOf(towards);
         if (!normal || glm::dot(*normal, towards) < minNormalCosine) return std::nullopt;
         setNormal(contact, field_, -*normal);
-        contact.turningRadius = -1;
+        contact.roundingRadius = -1;
         return contact;
     }
 
@@ -108,14 +108,14 @@ float maxSide(const Triangle& corners) {
 
 }  // namespace
 
-ContactReport collideTriangles(const TriangleSheet& sheet, const Pose& pose, const Motion& motion, const Placed& field,
-                               const ContactOptions& options, std::vector<Contact>& contacts) {
+ContactReport collideTriangles(const OpenSurface& openSurface, const Pose& pose, const Motion& motion,
+                               const Placed& field, const ContactOptions& options, std::vector<Contact>& contacts) {
     ContactReport report;
     const ProbedField probed(field, pose, motion, options);
     NearbyTriangles triangles(probed, relative(field.pose, pose));
-    const BodyTransform intoSheet(field.pose, field.scale, pose, 1);
-    sheet.visit(intoSheet.boxAround(field.collider.bounds(), probed.maxTriangleDistance()),
-                [&](const Triangle& corners, std::uint64_t id) { triangles.add(corners, id); });
+    const BodyTransform intoOpenSurface(field.pose, field.scale, pose, 1);
+    openSurface.visit(intoOpenSurface.boxAround(field.collider.bounds(), probed.maxTriangleDistance()),
+                      [&](const Triangle& corners, std::uint64_t id) { triangles.add(corners, id); });
     triangles.connect();
 
     const TriangleProbes probes(probed, triangles, report, contacts);

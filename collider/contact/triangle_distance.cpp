@@ -54,7 +54,7 @@ struct Plane {
                 return false;
         return normal2 > 0;
     }
-    // Volume of the box over the normal and a point: its height times the length of the normal.
+    // The height of a point over the plane, times the length of the normal.
     double height(const glm::dvec3& point) const { return glm::dot(point - corners[0], normal); }
 
     const TriangleCorners& corners;

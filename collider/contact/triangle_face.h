@@ -19,8 +19,9 @@ inline constexpr float flatEdge = -0.9999985f;
 struct TriangleFace {
     Triangle corners;
     std::array<glm::vec3, 3> outwards;
-    /// at an edge: into the neighbouring triangle, outward of this one
-    std::array<std::optional<glm::vec3>, 3> neighbours;
+    /// At an edge that is a crease: along the other triangle, out of it across the edge. Nothing at flat edges and at
+    /// borders.
+    std::array<std::optional<glm::vec3>, 3> outwardsOfOthers;
     glm::vec3 up;
 
     /// The face of a triangle, without its neighbours; nothing for a triangle without area.
@@ -37,7 +38,7 @@ struct TriangleFace {
     void findNeighbours(const Adjacency& adjacency, std::uint32_t triangle) {
         for (int i = 0; i < 3; ++i) {
             const auto neighbour = adjacency.neighbourOf(triangle, i);
-            if (neighbour && glm::dot(*neighbour, outwards[i]) < -flatEdge) neighbours[i] = -*neighbour;
+            if (neighbour && glm::dot(*neighbour, outwards[i]) < -flatEdge) outwardsOfOthers[i] = -*neighbour;
         }
     }
 
@@ -51,7 +52,8 @@ struct TriangleFace {
     bool isOutsideAboveCreases(const glm::vec3& place, float distance) const {
         for (int i = 0; i < 3; ++i) {
             const glm::vec3 offset = place - corners[i];
-            if (glm::dot(outwards[i], offset) > distance && !(neighbours[i] && isBelowCrease(i, offset, distance)))
+            if (glm::dot(outwards[i], offset) > distance &&
+                !(outwardsOfOthers[i] && isBelowCrease(i, offset, distance)))
                 return true;
         }
         return false;
@@ -62,9 +64,9 @@ struct TriangleFace {
 
   private:
     bool isBelowCrease(int edge, const glm::vec3& offset, float distance) const {
-        const glm::vec3& neighbour = *neighbours[edge];
-        const float rise = -glm::dot(neighbour, up);
-        return glm::dot(neighbour, offset) > -distance && std::copysign(1.f, rise) * glm::dot(up, offset) < distance;
+        const glm::vec3& outward = *outwardsOfOthers[edge];
+        const float rise = -glm::dot(outward, up);
+        return glm::dot(outward, offset) > -distance && std::copysign(1.f, rise) * glm::dot(up, offset) < distance;
     }
 };
 

@@ -9,11 +9,12 @@
 
 namespace bilayer::detail {
 
-/// Throws std::invalid_argument unless a batch has as many answers as points.
-inline void requireSameLength(std::size_t points, std::size_t answers, const char* name) {
-    if (points != answers)
-        throw std::invalid_argument(std::to_string(points) + " points need as many " + name + ", not " +
-                                    std::to_string(answers));
+/// Throws std::invalid_argument unless two arguments of a batch have the same length.
+/// @param nameA, nameB  what their items are, in errors
+inline void requireSameLength(std::size_t countA, const char* nameA, std::size_t countB, const char* nameB) {
+    if (countA != countB)
+        throw std::invalid_argument(std::to_string(countA) + ' ' + nameA + " need as many " + nameB + ", not " +
+                                    std::to_string(countB));
 }
 
 }  // namespace bilayer::detail

@@ -173,30 +173,30 @@ Need needOf(EntryBuilder builder, const std::vector<glm::ivec3>& cubes) {
 
 }  // namespace
 
-// Numbers the cubes with stored blocks tile by tile.
+// Numbers the cubes with stored blocks group by group.
 std::vector<glm::ivec3> BlockEntries::number(const FieldLayout& field) {
     const int blocksShift = shift_ - blockShift;
     const glm::ivec3 counts = (field.blocks + ((1 << blocksShift) - 1)) >> blocksShift;
-    tileCounts_ = (counts + 3) >> 2;
-    tiles_.assign(std::size_t(tileCounts_.x) * tileCounts_.y * tileCounts_.z, Tile());
+    groupCounts_ = (counts + 3) >> 2;
+    groups_.assign(std::size_t(groupCounts_.x) * groupCounts_.y * groupCounts_.z, CubeGroup());
     glm::ivec3 block;
     for (block.x = 0; block.x < field.blocks.x; ++block.x)
         for (block.y = 0; block.y < field.blocks.y; ++block.y)
             for (block.z = 0; block.z < field.blocks.z; ++block.z) {
                 if (field.directory[field.entryOf(block)] < 0) continue;
                 const glm::ivec3 cube = block >> blocksShift;
-                tiles_[tileOf(cube)].stored |= bitOf(cube);
+                groups_[groupOf(cube)].stored |= bitOf(cube);
             }
     std::vector<glm::ivec3> cubes;
-    glm::ivec3 tile;
-    for (tile.x = 0; tile.x < tileCounts_.x; ++tile.x)
-        for (tile.y = 0; tile.y < tileCounts_.y; ++tile.y)
-            for (tile.z = 0; tile.z < tileCounts_.z; ++tile.z) {
-                Tile& here = tiles_[tileOf(4 * tile)];
+    glm::ivec3 group;
+    for (group.x = 0; group.x < groupCounts_.x; ++group.x)
+        for (group.y = 0; group.y < groupCounts_.y; ++group.y)
+            for (group.z = 0; group.z < groupCounts_.z; ++group.z) {
+                CubeGroup& here = groups_[groupOf(4 * group)];
                 here.first = std::uint32_t(cubes.size());
                 for (std::uint64_t bits = here.stored; bits != 0; bits &= bits - 1) {
                     const int i = std::countr_zero(bits);
-                    cubes.push_back(4 * tile + glm::ivec3(i >> 4, i >> 2 & 3, i & 3));
+                    cubes.push_back(4 * group + glm::ivec3(i >> 4, i >> 2 & 3, i & 3));
                 }
             }
     return cubes;

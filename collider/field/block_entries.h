@@ -69,28 +69,28 @@ class BlockEntries {
             local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < size.x && local.y < size.y && local.z < size.z;
         if (!within) return {};
         const glm::ivec3 cube = glm::ivec3(local) >> shift_;
-        const Tile& tile = tiles_[tileOf(cube)];
+        const CubeGroup& group = groups_[groupOf(cube)];
         const std::uint64_t bit = bitOf(cube);
-        if (!(tile.stored & bit)) return {};
-        const std::size_t index = tile.first + std::size_t(std::popcount(tile.stored & (bit - 1)));
+        if (!(group.stored & bit)) return {};
+        const std::size_t index = group.first + std::size_t(std::popcount(group.stored & (bit - 1)));
         const glm::ivec3 place((glm::vec3(local - glm::dvec3(cube << shift_)) + reach_) * placesPerVoxel_ + 0.5f);
         return {&entries_[index * each_], each_, {place.x, place.y, place.z}, placesPerVoxel_};
     }
 
     float reach() const { return reach_; }  ///< [voxels]
-    std::size_t memoryBytes() const { return entries_.bytes() + tiles_.size() * sizeof(Tile); }
+    std::size_t memoryBytes() const { return entries_.bytes() + groups_.size() * sizeof(CubeGroup); }
 
   private:
     /// A group of 4^3 cubes: a bit mask of those with stored blocks, and the count of such cubes before the group. It
     /// is small compared with the field's directory.
-    struct Tile {
+    struct CubeGroup {
         std::uint64_t stored = 0;
         std::uint32_t first = 0;
     };
 
-    std::size_t tileOf(const glm::ivec3& cube) const {
-        const glm::ivec3 tile = cube >> 2;
-        return (std::size_t(tile.x) * tileCounts_.y + tile.y) * tileCounts_.z + tile.z;
+    std::size_t groupOf(const glm::ivec3& cube) const {
+        const glm::ivec3 group = cube >> 2;
+        return (std::size_t(group.x) * groupCounts_.y + group.y) * groupCounts_.z + group.z;
     }
     static std::uint64_t bitOf(const glm::ivec3& cube) {
         return std::uint64_t(1) << ((cube.x & 3) << 4 | (cube.y & 3) << 2 | (cube.z & 3));
@@ -101,8 +101,8 @@ class BlockEntries {
     int shift_ = 0;  ///< log2 of a cube's side [voxels]
     float reach_ = 0, placesPerVoxel_ = 0;
     glm::dvec3 extent_{0};  ///< of the field [voxels]
-    glm::ivec3 tileCounts_{0};
-    std::vector<Tile> tiles_;
+    glm::ivec3 groupCounts_{0};
+    std::vector<CubeGroup> groups_;
     LargeArray<BlockEntry> entries_;
 };
 

@@ -137,7 +137,7 @@ FeatureNormals::FeatureNormals(const Mesh& mesh, double thinnest) {
     flat_ = faces.flat();
 }
 
-bool FeatureNormals::isFlat(std::uint32_t triangle) const {
+bool FeatureNormals::hasNoNormal(std::uint32_t triangle) const {
     return !flat_.empty() && std::binary_search(flat_.begin(), flat_.end(), triangle);
 }
 

@@ -37,7 +37,7 @@ class FeatureNormals {
     /// The pseudonormal of a point of the mesh.
     const glm::vec3& ofVertex(std::uint32_t point) const { return vertices_[point]; }
     /// Whether a triangle has no normal: it has no area, or another triangle is its reverse.
-    bool isFlat(std::uint32_t triangle) const;
+    bool hasNoNormal(std::uint32_t triangle) const;
 
     std::size_t memoryBytes() const;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Closest-point queries on a mesh with a field. The point's block holds the hierarchy nodes to search. The distance to
 // the closest feature is then computed in double precision.
+// Tested by tests/collider/field_closest.cpp through closest().
 #include <hwy/cache_control.h>
 
 #include <algorithm>
@@ -154,9 +155,7 @@ bool FieldData::confirms(const NearestFeature& nearest, const Side& side) const 
     return hasSide && ((height < 0) == side.inside || (distance < close && double(std::abs(side.distance)) < close));
 }
 
-// The field decides where it is certain, so that all queries agree. Otherwise, in an open mesh signed by winding
-// numbers, the normal decides next to a wall alone; else the winding number. In other meshes signed by normals, the
-// normal decides, if the sample confirms it; else the winding number of a closed mesh.
+// By the rules at Field::closest().
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
     const Side side = sideAt(toLocal(point));
     if (side.certain) return side.inside;
@@ -230,7 +229,7 @@ ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noe
 
 // Interleaves the searches of several points, so that prefetches are well ahead of their use.
 void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> answers, float maxDistance) const {
-    requireSameLength(points.size(), answers.size(), "answers");
+    requireSameLength(points.size(), "points", answers.size(), "answers");
     if (!data_->mesh || !(maxDistance >= 0)) {
         for (std::size_t i = 0; i < points.size(); ++i) answers[i] = data_->closest(points[i], maxDistance);
         return;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Inside tests and overlaps of spheres and boxes, and the batch versions of all queries.
+// Inside tests, overlaps of spheres and boxes, and batches of these, of rays and of sphere casts.
+// Tested by tests/collider/field_overlaps.cpp through overlapsSphere().
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -85,38 +86,38 @@ bool Field::overlapsBox(const OrientedBox& box) const noexcept {
 }
 
 void Field::inside(std::span<const glm::vec3> points, std::span<bool> answers) const {
-    requireSameLength(points.size(), answers.size(), "answers");
+    requireSameLength(points.size(), "points", answers.size(), "answers");
     for (std::size_t i = 0; i < points.size(); ++i) answers[i] = inside(points[i]);
 }
 
 void Field::raycast(std::span<const Ray> rays, std::span<std::optional<RayHit>> hits) const {
-    requireSameLength(rays.size(), hits.size(), "hits");
+    requireSameLength(rays.size(), "rays", hits.size(), "hits");
     for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = raycast(rays[i]);
 }
 
 void Field::segment(std::span<const glm::vec3> from, std::span<const glm::vec3> to,
                     std::span<std::optional<RayHit>> hits) const {
-    requireSameLength(from.size(), hits.size(), "hits");
-    requireSameLength(to.size(), hits.size(), "hits");
+    requireSameLength(from.size(), "starts", to.size(), "ends");
+    requireSameLength(from.size(), "starts", hits.size(), "hits");
     for (std::size_t i = 0; i < from.size(); ++i) hits[i] = segment(from[i], to[i]);
 }
 
 void Field::sphereCast(std::span<const Ray> rays, std::span<const float> radii,
                        std::span<std::optional<RayHit>> hits) const {
-    requireSameLength(rays.size(), hits.size(), "hits");
-    requireSameLength(radii.size(), hits.size(), "hits");
+    requireSameLength(rays.size(), "rays", radii.size(), "radii");
+    requireSameLength(rays.size(), "rays", hits.size(), "hits");
     for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = sphereCast(rays[i], radii[i]);
 }
 
 void Field::overlapsSphere(std::span<const glm::vec3> centres, std::span<const float> radii,
                            std::span<bool> answers) const {
-    requireSameLength(centres.size(), answers.size(), "answers");
-    requireSameLength(radii.size(), answers.size(), "answers");
+    requireSameLength(centres.size(), "centres", radii.size(), "radii");
+    requireSameLength(centres.size(), "centres", answers.size(), "answers");
     for (std::size_t i = 0; i < centres.size(); ++i) answers[i] = overlapsSphere(centres[i], radii[i]);
 }
 
 void Field::overlapsBox(std::span<const OrientedBox> boxes, std::span<bool> answers) const {
-    requireSameLength(boxes.size(), answers.size(), "answers");
+    requireSameLength(boxes.size(), "boxes", answers.size(), "answers");
     for (std::size_t i = 0; i < boxes.size(); ++i) answers[i] = overlapsBox(boxes[i]);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ray and sphere casts: against the triangles if there is a mesh, otherwise against the zero set of the interpolant.
+// Tested by tests/collider/field_rays.cpp through raycast().
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>

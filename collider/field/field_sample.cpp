@@ -231,9 +231,9 @@ HWY_INLINE void locateFour(const FieldData& field, const glm::vec3* points, Loca
 }
 
 /// Two consecutive floats, each in four lanes.
-HWY_INLINE TwoFloats eachInFour(const float* two) {
+HWY_INLINE EightFloats eachInFour(const float* two) {
     const double pair = load<double>(two);
-    const TwoFloats pairs = reinterpret_cast<TwoFloats>(FourDoubles{pair, pair, pair, pair});
+    const EightFloats pairs = reinterpret_cast<EightFloats>(FourDoubles{pair, pair, pair, pair});
     return __builtin_shufflevector(pairs, pairs, 0, 0, 0, 0, 5, 5, 5, 5);
 }
 
@@ -242,7 +242,7 @@ template <class Value>
 HWY_INLINE bool sampleTwo(const FieldData& field, const LocatedCells<Value>& cells, std::size_t slot, Sample* samples) {
     const auto two = loadCells(cells.first[slot], cells.first[slot + 1]);
     const Floats& scales = field.lanes.scales;
-    const TwoFloats found =
+    const EightFloats found =
         interpolate(two, eachInFour(&cells.x[slot]), eachInFour(&cells.y[slot]), eachInFour(&cells.z[slot])) *
         both(scales, scales);
     const Floats first = __builtin_shufflevector(found, found, 0, 1, 2, 3),
@@ -313,7 +313,7 @@ float Field::distance(const glm::vec3& point) const noexcept {
 }
 
 void Field::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
-    requireSameLength(points.size(), samples.size(), "samples");
+    requireSameLength(points.size(), "points", samples.size(), "samples");
     data_->kernels.sampleMany(*data_, points, samples.data());
 }
 

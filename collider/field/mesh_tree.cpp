@@ -90,7 +90,7 @@ NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& poi
                  acrossAC = double(leaf.directionAC[1][i]) * x - double(leaf.directionAC[0][i]) * y;
     const double room = roomAt(point) * perMetre_;
     const bool over = std::min({y, acrossBC, acrossAC}) > room && std::abs(z) < near;
-    if (!over || normals_.isFlat(triangle)) return featureOf(triangle, point);
+    if (!over || normals_.hasNoNormal(triangle)) return featureOf(triangle, point);
     return {.triangle = triangle,
             .offset = (-z * double(voxelSize_)) * normal,
             .normal = normal,
@@ -133,7 +133,7 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
     const auto inside = [&](std::size_t i) { return glm::dot(glm::cross(c[i], edges[i]), n) >= 0; };
     if (n2 > minRelativeHeight * minRelativeHeight * longest2 * longest2 && inside(0) && inside(1) && inside(2)) {
         found.offset = (glm::dot(c[0], n) / n2) * n;
-        if (!normals_.isFlat(triangle)) found.normal = n / std::sqrt(n2);
+        if (!normals_.hasNoNormal(triangle)) found.normal = n / std::sqrt(n2);
     } else {
         toEdge(found, c);
     }

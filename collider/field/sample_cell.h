@@ -42,7 +42,7 @@ HWY_INLINE CellLanes<Floats> loadCell(const float* v) {
     return {loadPairs(v), loadPairs(v + xStep), false};
 }
 
-HWY_INLINE CellLanes<TwoFloats> loadCells(const float* v, const float* w) {
+HWY_INLINE CellLanes<EightFloats> loadCells(const float* v, const float* w) {
     return {both(loadPairs(v), loadPairs(w)), both(loadPairs(v + xStep), loadPairs(w + xStep)), false};
 }
 
@@ -64,18 +64,18 @@ HWY_INLINE bool anyBeyondBand(Steps steps) {
     return (marked[0] | marked[1]) != 0;
 }
 
-HWY_INLINE TwoFloats toFloats(Steps steps) {
-    return __builtin_convertvector(__builtin_convertvector(steps, TwoInts), TwoFloats);
+HWY_INLINE EightFloats toFloats(Steps steps) {
+    return __builtin_convertvector(__builtin_convertvector(steps, EightInts), EightFloats);
 }
 
 HWY_INLINE CellLanes<Floats> loadCell(const std::int16_t* v) {
     const Steps steps = loadSteps(v);
-    const TwoFloats values = toFloats(steps);
+    const EightFloats values = toFloats(steps);
     return {__builtin_shufflevector(values, values, 0, 1, 2, 3), __builtin_shufflevector(values, values, 4, 5, 6, 7),
             anyBeyondBand(steps)};
 }
 
-HWY_INLINE CellLanes<TwoFloats> loadCells(const std::int16_t* v, const std::int16_t* w) {
+HWY_INLINE CellLanes<EightFloats> loadCells(const std::int16_t* v, const std::int16_t* w) {
     const Steps first = loadSteps(v), second = loadSteps(w);
     return {toFloats(__builtin_shufflevector(first, second, 0, 1, 2, 3, 8, 9, 10, 11)),
             toFloats(__builtin_shufflevector(first, second, 4, 5, 6, 7, 12, 13, 14, 15)),

@@ -26,8 +26,8 @@ namespace {
 
 using Words [[gnu::vector_size(16)]] = std::uint32_t;
 using FourDoubles [[gnu::vector_size(32)]] = double;
-using TwoFloats [[gnu::vector_size(32)]] = float;  // of two places
-using TwoInts [[gnu::vector_size(32)]] = std::int32_t;
+using EightFloats [[gnu::vector_size(32)]] = float;  // of two places
+using EightInts [[gnu::vector_size(32)]] = std::int32_t;
 
 template <class Word, class Element>
 HWY_INLINE Word load(const Element* from) {
@@ -75,16 +75,16 @@ HWY_INLINE Floats evenLanes(Floats a, Floats b) {
 HWY_INLINE Floats oddLanes(Floats a, Floats b) {
     return __builtin_shufflevector(a, b, 1, 3, 5, 7);
 }
-HWY_INLINE TwoFloats lowerHalves(TwoFloats a, TwoFloats b) {
+HWY_INLINE EightFloats lowerHalves(EightFloats a, EightFloats b) {
     return __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
 }
-HWY_INLINE TwoFloats upperHalves(TwoFloats a, TwoFloats b) {
+HWY_INLINE EightFloats upperHalves(EightFloats a, EightFloats b) {
     return __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
 }
-HWY_INLINE TwoFloats evenLanes(TwoFloats a, TwoFloats b) {
+HWY_INLINE EightFloats evenLanes(EightFloats a, EightFloats b) {
     return __builtin_shufflevector(a, b, 0, 2, 8, 10, 4, 6, 12, 14);
 }
-HWY_INLINE TwoFloats oddLanes(TwoFloats a, TwoFloats b) {
+HWY_INLINE EightFloats oddLanes(EightFloats a, EightFloats b) {
     return __builtin_shufflevector(a, b, 1, 3, 9, 11, 5, 7, 13, 15);
 }
 // The first three lanes of `a` and the first lane of `b`.
@@ -95,10 +95,10 @@ HWY_INLINE Floats withFourth(Floats a, Floats b) {
     return __builtin_shufflevector(a, b, 0, 1, 2, 4);
 #endif
 }
-HWY_INLINE TwoFloats withFourth(TwoFloats a, TwoFloats b) {
+HWY_INLINE EightFloats withFourth(EightFloats a, EightFloats b) {
     return __builtin_shufflevector(a, b, 0, 1, 2, 8, 4, 5, 6, 12);
 }
-HWY_INLINE TwoFloats both(Floats a, Floats b) {
+HWY_INLINE EightFloats both(Floats a, Floats b) {
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 

@@ -30,7 +30,8 @@ void readSurfaceBlocks(const std::filesystem::path& path, std::vector<SurfaceBlo
     stream.read(reinterpret_cast<char*>(blocks.data() + before),
                 std::streamsize((blocks.size() - before) * sizeof(SurfaceBlock)));
     if (!stream || bytes % sizeof(SurfaceBlock) != 0)
-        throw std::runtime_error(fmt::format("{}: cannot be read, or is no whole count of blocks", path.string()));
+        throw std::runtime_error(fmt::format("{}: cannot be read, or its size is no multiple of {} bytes",
+                                             path.string(), sizeof(SurfaceBlock)));
 }
 
 }  // namespace bilayer::detail

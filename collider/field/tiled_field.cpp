@@ -29,7 +29,7 @@ Sample TiledField::sample(const glm::vec3& point) const {
 
 // Tile after tile, so that each is read once.
 void TiledField::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
-    requireSameLength(points.size(), samples.size(), "samples");
+    requireSameLength(points.size(), "points", samples.size(), "samples");
     std::vector<std::optional<std::size_t>> tiles;
     for (const glm::vec3& point : points) tiles.push_back(data_->tileOf(point));
     std::vector<std::size_t> order(points.size());

@@ -63,7 +63,7 @@ class TiledFieldData {
     TileManifest manifest_;
     Storage storage_;
     std::shared_ptr<const Grids> pattern_;    // without voxels: properties that all tiles have
-    FieldFrame frame_;                        // without bounds of a directory, which would be too large
+    FieldFrame frame_;                        // of the whole field; it has no directory, which would be too large
     glm::ivec3 first_{0};                     // voxel of the box of all stored blocks
     glm::dvec3 fixedOffset_{0};               // of a point's place, as FieldData::Lanes has it [voxels]
     std::array<std::vector<int>, 3> starts_;  // of tiles along each axis, in blocks from `first_`

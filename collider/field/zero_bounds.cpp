@@ -61,8 +61,9 @@ Separation separation(const glm::dvec3& point, const CubeExpansion& cube) noexce
     return {direction, nearest.x + nearest.y + nearest.z - weight * beyond};
 }
 
-// Lagrangian dual: at the zeros, the distance is the distance plus a multiple of the interpolant. That sum is bounded
-// by its expansion about the cube's centre, term by term. At the offset t from there, the distance is at least
+// Lagrangian dual: the interpolant is 0 at its zeros. Adding any multiple of it to the distance thus leaves the
+// distance there as it is, and a bound of the sum bounds the distance. The bound is that of the sum's expansion about
+// the cube's centre, term by term. At the offset t from there, the distance is at least
 //   distance + direction . t + rounding (t . t - (direction . t)^2)
 // as sqrt(a^2 + b^2) - a is at least b^2 / (sqrt(A^2 + B^2) + A) for all a <= A, b <= B.
 double curvedDistance(const glm::dvec3& point, const CubeExpansion& cube) noexcept {

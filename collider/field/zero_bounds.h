@@ -24,8 +24,8 @@ struct Separation {
 };
 Separation separation(const glm::dvec3& point, const CubeExpansion& cube) noexcept;
 
-/// A bound that counts the curvature of spheres about the point, and the interpolant's with it. Where the surface is
-/// such a sphere, its error falls with the cube of the side; that of `separation` falls with the square.
+/// A bound that takes into account the curvature of spheres about the point and of the interpolant. Where the surface
+/// is such a sphere, its error falls with the cube of the side; that of `separation` falls with the square.
 double curvedDistance(const glm::dvec3& point, const CubeExpansion& cube) noexcept;
 
 }  // namespace bilayer::detail

@@ -3,6 +3,7 @@
 // directory's first voxel. A cell whose eight values have one sign contains no surface. A cell with both signs has
 // surface on its edges. Both hold for sub-cells too, so results are certain up to the size of the smallest sub-cells.
 // All functions may run on any number of threads at once, and allocate nothing. Paths are cast in zero_rays.cpp.
+// Tested by tests/collider/zero_set.cpp through closest().
 #pragma once
 
 #include <glm/vec3.hpp>

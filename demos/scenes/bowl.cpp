@@ -57,11 +57,11 @@ constexpr double maxDrift = 1;      // drift while kept awake [voxels]
 constexpr Look bowlLook{.colour = 0x35506b, .roughness = 0.45f, .clearcoat = 0.6f};
 constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9db4d6, 0xe8a598, 0xc9b1d9, 0x7fb7be};
 
-std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
+std::shared_ptr<const BodyPrototype> bodyOf(const Kind& kind, float resolution) {
     const glm::mat4 toSize = glm::scale(glm::mat4(1), glm::vec3(bodySize / bounds(kind.mesh).longestSide()));
-    return makeThing(transformed(kind.mesh, toSize), {.voxelSize = bodySize / resolution,
-                                                      .interiorWidthVoxels = bodyInteriorVoxels,
-                                                      .restingFriction = restingFriction});
+    return makePrototype(transformed(kind.mesh, toSize), {.voxelSize = bodySize / resolution,
+                                                          .interiorWidthVoxels = bodyInteriorVoxels,
+                                                          .restingFriction = restingFriction});
 }
 
 // Returns the max distance of the surface from a point [m].
@@ -83,15 +83,15 @@ std::vector<glm::vec2> layerOf(float scale, float apart) {
 
 // Returns poses in layers above the bowl, each layer rotated relative to those below, and every body rotated at random
 // about the centre of its box.
-std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const Thing>>& things, const BowlOptions& options,
-                             float scale) {
+std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const BodyPrototype>>& prototypes,
+                             const BowlOptions& options, float scale) {
     std::mt19937 random(options.seed);
     std::normal_distribution<float> normal;
     float apart = minApart;
     std::vector<glm::vec3> middles;
-    for (const auto& thing : things) {
-        middles.push_back(bounds(thing->mesh).centre());
-        apart = std::max(apart, 2 * reachOf(thing->mesh, middles.back()));
+    for (const auto& prototype : prototypes) {
+        middles.push_back(bounds(prototype->mesh).centre());
+        apart = std::max(apart, 2 * reachOf(prototype->mesh, middles.back()));
     }
     const std::vector<glm::vec2> places = layerOf(scale, apart);
     std::vector<Pose> poses;
@@ -102,7 +102,7 @@ std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const Thing>>& th
         const float x = normal(random), y = normal(random), z = normal(random), w = normal(random);
         const glm::vec3 at(radius * std::cos(angle), radius * std::sin(angle), apart * float(layer));
         const glm::quat rotation = glm::normalize(glm::quat(w, x, y, z));
-        poses.push_back({at - rotation * middles[i % things.size()], rotation});
+        poses.push_back({at - rotation * middles[i % prototypes.size()], rotation});
     }
     return poses;
 }
@@ -129,11 +129,11 @@ double drift(Stage& stage, const std::vector<btRigidBody*>& bodies, double secon
     return largest;
 }
 
-std::string describe(const Thing& thing) {
-    const MeshReport report = inspect(thing.mesh);
+std::string describe(const BodyPrototype& prototype) {
+    const MeshReport report = inspect(prototype.mesh);
     return fmt::format("{} triangles, {}; {} voxels of {:.2f} mm, {:.1f} MB", report.triangles,
-                       report.closed() && report.oriented() ? "closed" : "NOT closed", thing.field.activeVoxels(),
-                       1e3 * thing.field.voxelSize(), 1e-6 * double(thing.field.memoryBytes()));
+                       report.closed() && report.oriented() ? "closed" : "NOT closed", prototype.field.activeVoxels(),
+                       1e3 * prototype.field.voxelSize(), 1e-6 * double(prototype.field.memoryBytes()));
 }
 
 }  // namespace
@@ -152,11 +152,11 @@ Outcome bowl(const BowlOptions& options) {
     if (options.kinds.empty()) throw std::invalid_argument("a bowl needs a kind of body");
     const float scale = std::cbrt(std::max(1.f, float(options.bodies) / usualBodies));
     const auto start = std::chrono::steady_clock::now();
-    std::vector<std::shared_ptr<const Thing>> things;
-    for (const Kind& kind : options.kinds) things.push_back(bodyOf(kind, float(options.resolution)));
+    std::vector<std::shared_ptr<const BodyPrototype>> prototypes;
+    for (const Kind& kind : options.kinds) prototypes.push_back(bodyOf(kind, float(options.resolution)));
     const float radius = scale * bowlRadius, wall = scale * bowlWall;
-    const auto vessel = makeThing(shapes::bowl(radius, wall, 192, bowlOpening, scale * bowlFoot),
-                                  {bowlVoxels * things[0]->field.voxelSize(), bowlInteriorVoxels});
+    const auto vessel = makePrototype(shapes::bowl(radius, wall, 192, bowlOpening, scale * bowlFoot),
+                                      {bowlVoxels * prototypes[0]->field.voxelSize(), bowlInteriorVoxels});
     const std::chrono::duration<double> built = std::chrono::steady_clock::now() - start;
 
     Stage stage(fmt::format("{} bodies in a bowl", options.bodies), {.framesPerMeasuring = 30});
@@ -167,10 +167,10 @@ Outcome bowl(const BowlOptions& options) {
     stage.add(vessel, {}, {}, bowlLook);
     const Matter matter{.mass = 1, .restingSpeed = restingSpeed, .restingSpin = restingSpin};
     std::vector<btRigidBody*> bodies;
-    for (const Pose& pose : startPoses(things, options, scale)) {
+    for (const Pose& pose : startPoses(prototypes, options, scale)) {
         const std::size_t i = bodies.size();
         const Look look{.colour = colours[i % std::size(colours)], .roughness = 0.55f, .clearcoat = 0.12f};
-        bodies.push_back(&stage.add(things[i % things.size()], matter, pose, look));
+        bodies.push_back(&stage.add(prototypes[i % prototypes.size()], matter, pose, look));
     }
     stage.run(options.seconds, [&] { return stage.allAsleep(); });
     const int awake = stage.world().moving() - stage.world().asleep();
@@ -187,9 +187,9 @@ Outcome bowl(const BowlOptions& options) {
                                     .azimuth = -1.35f,
                                     .elevation = 0.78f,
                                     .groundHeight = bounds(vessel->mesh).lower.z});
-    for (std::size_t i = 0; i < things.size(); ++i) {
-        outcome.facts.emplace_back(options.kinds[i].name, describe(*things[i]));
-        outcome.fields.emplace_back(options.kinds[i].name, things[i]->field);
+    for (std::size_t i = 0; i < prototypes.size(); ++i) {
+        outcome.facts.emplace_back(options.kinds[i].name, describe(*prototypes[i]));
+        outcome.fields.emplace_back(options.kinds[i].name, prototypes[i]->field);
     }
     outcome.facts.emplace_back("bowl", describe(*vessel));
     outcome.facts.emplace_back("build the fields", fmt::format("{:.2f} s", built.count()));

@@ -75,8 +75,8 @@ double gaussLinkingNumber(const Pose& a, double radiusA, const Pose& b, double r
 Outcome chain(const ChainOptions& options) {
     Stage stage(fmt::format("A chain of {} rings", options.links), {.stepsPerSecond = options.stepsPerSecond});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
-    const auto link = makeThing(shapes::torus(major, minor, 64, 24), {options.voxelSize});
-    const auto bob = makeThing(shapes::torus(bobSize * major, bobSize * minor, 64, 24), {options.voxelSize});
+    const auto link = makePrototype(shapes::torus(major, minor, 64, 24), {options.voxelSize});
+    const auto bob = makePrototype(shapes::torus(bobSize * major, bobSize * minor, 64, 24), {options.voxelSize});
 
     // upright rings, every second one rotated by 90 degrees, each hanging in the previous one, surface on surface
     const glm::quat upright = glm::angleAxis(glm::half_pi<float>(), glm::vec3(1, 0, 0));

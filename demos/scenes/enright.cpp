@@ -110,7 +110,7 @@ std::vector<Advected> seeded(const openvdb::Vec3SGrid& velocity) {
     return bodies;
 }
 
-// Returns what checkLevelSet finds, except for gradients next to the surface.
+// Whether OpenVDB's checkLevelSet() finds no fault, except for gradients.
 bool isLevelSet(const FloatGrid& grid) {
     openvdb::tools::CheckLevelSet<FloatGrid> check(grid);
     return grid.getGridClass() == openvdb::GRID_LEVEL_SET &&
@@ -146,7 +146,7 @@ void judge(Outcome& outcome, const std::vector<Advected>& bodies) {
     outcome.facts.emplace_back("D. Enright et al. 2002, 100 voxels", "80 % by a level set alone, 2.6 % with particles");
     outcome.criteria = {{"sphere loses more than OpenVDB's", bodies[0].lost() - bodies[1].lost(), noise, "%"},
                         {"bunny loses more than OpenVDB's", bodies[2].lost() - bodies[3].lost(), noise, "%"},
-                        {"that are no level sets in the end", double(broken), 0}};
+                        {"results that are no level sets", double(broken), 0}};
 }
 
 }  // namespace

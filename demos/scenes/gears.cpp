@@ -140,14 +140,15 @@ std::vector<Wheel> addTrain(Stage& stage, Axles& axles, Train train, const Gears
             place += distance * glm::vec3(std::cos(direction), std::sin(direction), 0);
             angle = shapes::meshingAngle(part, angle, last, direction);
         }
-        const auto thing =
-            makeThing(std::move(train.meshes[i]),
-                      {.voxelSize = options.voxelSize, .margin = margin, .accuracy = ContactAccuracy::exact});
-        const float mass = density * float(massProperties(thing->mesh).volume);
+        const auto prototype =
+            makePrototype(std::move(train.meshes[i]),
+                          {.voxelSize = options.voxelSize, .margin = margin, .accuracy = ContactAccuracy::exact});
+        const float mass = density * float(massProperties(prototype->mesh).volume);
         const Pose pose{place, glm::angleAxis(angle, glm::vec3(0, 0, 1))};
         const Matter matter{.mass = mass, .friction = friction, .linearDamping = 0, .angularDamping = 0};
-        btRigidBody& body = stage.add(
-            thing, matter, pose, {.colour = colours[i % std::size(colours)], .roughness = 0.35f, .metalness = 0.3f});
+        btRigidBody& body =
+            stage.add(prototype, matter, pose,
+                      {.colour = colours[i % std::size(colours)], .roughness = 0.35f, .metalness = 0.3f});
         body.setActivationState(DISABLE_DEACTIVATION);
         axles.add(body, place);
         const double sign = i % 2 == 0 ? 1 : -1;

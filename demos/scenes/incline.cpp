@@ -39,13 +39,13 @@ glm::vec3 positionOf(const btRigidBody& body) {
 
 // Adds an incline that descends towards +x, with its lower end at `y`, and one block per friction at its upper end.
 void addIncline(Stage& stage, std::vector<Rider>& riders, const InclineOptions& options, float degrees, float y,
-                const std::shared_ptr<const Thing>& block) {
+                const std::shared_ptr<const BodyPrototype>& block) {
     const float slope = glm::radians(degrees);
     // as long as the fastest block needs, plus a margin
     const float distance = 0.5f * gravity * std::sin(slope) * options.seconds * options.seconds;
     const float halfLength = 0.5f * distance + 4 * halfBlock.x, width = lane * float(options.frictions.size());
     const glm::quat tilt = glm::angleAxis(slope, glm::vec3(0, 1, 0));
-    const auto ramp = makeThing(shapes::box({halfLength, width / 2, halfThickness}), {options.voxelSize});
+    const auto ramp = makePrototype(shapes::box({halfLength, width / 2, halfThickness}), {options.voxelSize});
     const Pose pose{{0, y + width / 2, halfLength * std::sin(slope)}, tilt};
     stage.add(ramp, {.friction = 1}, pose, rampLook);
 
@@ -92,7 +92,7 @@ std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, floa
 
 Outcome incline(const InclineOptions& options) {
     Stage stage("Blocks on inclines");
-    const auto block = makeThing(shapes::box(halfBlock), {options.voxelSize});
+    const auto block = makePrototype(shapes::box(halfBlock), {options.voxelSize});
     std::vector<Rider> riders;
     const float width = lane * float(options.frictions.size() + 1);
     for (std::size_t i = 0; i < options.slopes.size(); ++i)

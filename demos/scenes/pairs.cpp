@@ -50,7 +50,7 @@ constexpr std::uint32_t fieldColour = 0xe07a5f, shapeColour = 0x9db4d6;
 // A body and its resting state.
 struct Part {
     std::string name;
-    std::shared_ptr<const Thing> thing;
+    std::shared_ptr<const BodyPrototype> prototype;
     float below, above;       // height of its centre above its lowest point, and of its top above its centre [m]
     glm::vec3 axis{0, 0, 1};  // vertical or horizontal, initially and at rest; zero: it may roll
     bool isField = false;
@@ -188,11 +188,11 @@ class Maker {
         return part("GImpact", shapes::box(s_ * halfBox), {shape, &shape->shape}, halfBox.z);
     }
     Part field(const std::string& name, Mesh mesh, float height, const glm::vec3& axis = {0, 0, 1}) const {
-        return {name, makeThing(std::move(mesh), {.voxelSize = s_ * voxel}), s_ * height, s_ * height, axis, true};
+        return {name, makePrototype(std::move(mesh), {.voxelSize = s_ * voxel}), s_ * height, s_ * height, axis, true};
     }
     Part part(const std::string& name, Mesh mesh, std::shared_ptr<btCollisionShape> shape, float height,
               const glm::vec3& axis = {0, 0, 1}) const {
-        return {name, makeThing(std::move(mesh), std::move(shape), s_ * voxel), s_ * height, s_ * height, axis};
+        return {name, makePrototype(std::move(mesh), std::move(shape), s_ * voxel), s_ * height, s_ * height, axis};
     }
     // Bullet grows hulls and cones by their margin.
     Part hull(const std::string& name, const glm::vec3& half) const {
@@ -252,7 +252,7 @@ class Board {
 
     /// An infinite plane; everything else must be above it.
     void addGround(const Part& ground) {
-        stage_.add(ground.thing, {}, {}, {.colour = 0xcfd6dd});
+        stage_.add(ground.prototype, {}, {}, {.colour = 0xcfd6dd});
         ++bodies_;
     }
     void add(const Part& upper, const Part& lower, State state, bool upperFirst) {
@@ -263,10 +263,10 @@ class Board {
         const glm::vec3 place = scale_ * lane * glm::vec3(n % columns, n / columns, 0);
         const float rest = lower.above + upper.below;
         const Pose above{place + glm::vec3(0, 0, rest + scale_ * fall * voxel)};
-        if (!upperFirst && lower.thing) addLower(lower, state, {place});
+        if (!upperFirst && lower.prototype) addLower(lower, state, {place});
         const std::size_t index = bodies_;
         addBody(upper, matter(scale_ * mass, mayRoll(upper)), above);
-        if (upperFirst && lower.thing) addLower(lower, state, {place});
+        if (upperFirst && lower.prototype) addLower(lower, state, {place});
         cells_.push_back({name, index, rest, upper.axis});
     }
 
@@ -288,7 +288,7 @@ class Board {
     btRigidBody& addBody(const Part& part, const Matter& matter, const Pose& pose) {
         ++bodies_;
         const std::uint32_t colour = part.isField ? fieldColour : shapeColour;
-        return stage_.add(part.thing, matter, pose, {.colour = colour, .roughness = 0.4f, .clearcoat = 0.2f});
+        return stage_.add(part.prototype, matter, pose, {.colour = colour, .roughness = 0.4f, .clearcoat = 0.2f});
     }
     void addLower(const Part& part, State state, const Pose& pose) {
         btRigidBody& body = addBody(part, matter(state == State::moving ? scale_ * mass : 0), pose);

@@ -39,7 +39,7 @@ constexpr Look pegLook{.colour = 0xe07a5f, .roughness = 0.35f, .metalness = 0.3f
 struct Lane {
     std::string name;
     float clearance;
-    std::shared_ptr<const Thing> block, peg;
+    std::shared_ptr<const BodyPrototype> block, peg;
     float mouth;                           // z of the hole's opening [m]
     float offset, tilt;                    // initial, see PegsOptions
     std::size_t blockIndex{}, pegIndex{};  // index in a frame
@@ -78,25 +78,26 @@ bool hasFactoryPeg(const std::filesystem::path& folder) {
 Outcome pegs(const PegsOptions& options) {
     Stage stage("Pegs in holes", {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
-    const ThingOptions things{.voxelSize = options.voxelSize, .margin = margin, .accuracy = ContactAccuracy::exact};
+    const PrototypeOptions prototypes{
+        .voxelSize = options.voxelSize, .margin = margin, .accuracy = ContactAccuracy::exact};
     const shapes::HoledBlock blockPart;
-    const auto block = makeThing(shapes::holedBlock(blockPart), things);
+    const auto block = makePrototype(shapes::holedBlock(blockPart), prototypes);
     const float mouth = blockPart.height / 2, floor = blockPart.floor - mouth;
 
     std::vector<Lane> lanes;
     for (const float clearance : options.clearances)
         lanes.push_back({fmt::format("{:g} mm", 1e3f * clearance), clearance, block,
-                         makeThing(shapes::peg({.clearance = clearance}), things), mouth, options.offset,
+                         makePrototype(shapes::peg({.clearance = clearance}), prototypes), mouth, options.offset,
                          options.tilt});
-    std::shared_ptr<const Thing> table;
+    std::shared_ptr<const BodyPrototype> table;
     if (!options.factory.empty()) {
         const Mesh plate = shapes::moved(readMesh(options.factory / factoryPlate), {0, 0, floor});
         const Mesh peg = shapes::moved(readMesh(options.factory / factoryPeg), {0, 0, -shapes::Peg{}.length / 2});
-        lanes.push_back({"Factory", factoryClearance, makeThing(plate, things), makeThing(peg, things),
+        lanes.push_back({"Factory", factoryClearance, makePrototype(plate, prototypes), makePrototype(peg, prototypes),
                          bounds(plate).upper.z, 0, factoryTilt});
         const glm::vec3 half(blockPart.width / 2, blockPart.width / 2, tableThickness / 2);
-        table = makeThing(shapes::box(half), std::make_shared<btBoxShape>(btVector3(half.x, half.y, half.z)),
-                          options.voxelSize);
+        table = makePrototype(shapes::box(half), std::make_shared<btBoxShape>(btVector3(half.x, half.y, half.z)),
+                              options.voxelSize);
     }
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         Lane& each = lanes[i];

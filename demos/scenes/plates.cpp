@@ -37,8 +37,8 @@ std::uint32_t colourOf(float speed) {
 }
 
 // Balls fall straight down, side by side, and plates are rotated. All impacts happen in the same step.
-Shot addLane(Stage& stage, const PlatesOptions& options, const std::shared_ptr<const Thing>& ball,
-             const std::shared_ptr<const Thing>& plate, const glm::vec3& place, float angle, float thickness,
+Shot addLane(Stage& stage, const PlatesOptions& options, const std::shared_ptr<const BodyPrototype>& ball,
+             const std::shared_ptr<const BodyPrototype>& plate, const glm::vec3& place, float angle, float thickness,
              float speed, float phase) {
     const glm::quat tilt = glm::angleAxis(glm::radians(angle), glm::vec3(0, 1, 0));
     stage.add(plate, {.friction = 0.5f, .restitution = 1}, {place, tilt}, plateLook);
@@ -92,12 +92,12 @@ std::string describe(const std::vector<Shot>& shots, bool Shot::*failed) {
 Outcome plates(const PlatesOptions& options) {
     Stage stage("Balls shot at thin plates", {.stepsPerSecond = options.stepsPerSecond, .stepsPerFrame = 1});
     stage.world().bullet().setGravity({0, 0, 0});
-    const auto ball = makeThing(shapes::sphere(radius, 4), {options.voxelSize});
+    const auto ball = makePrototype(shapes::sphere(radius, 4), {options.voxelSize});
     std::vector<Shot> shots;
     float row = 0;
     for (const float thickness : options.thicknesses) {
         const glm::vec3 half(halfPlate, halfPlate, 0.5f * thickness * options.voxelSize);
-        const auto plate = makeThing(shapes::box(half), {options.voxelSize});
+        const auto plate = makePrototype(shapes::box(half), {options.voxelSize});
         for (const float angle : options.angles)
             for (int phase = 0; phase < options.phases; ++phase, ++row)
                 for (std::size_t i = 0; i < options.speeds.size(); ++i) {

@@ -83,9 +83,9 @@ Outcome rings(const RingsOptions& options) {
         fmt::format("{} rings on {} poles", poles * options.ringsPerPole, poles),
         {.stepsPerSecond = options.stepsPerSecond, .stepsPerFrame = 8, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
-    const auto ground = makeThing(shapes::box({halfSide, halfSide, halfFloor}), {coarse * options.voxelSize});
-    const auto pole = makeThing(shapes::cylinder(poleRadius, top, 48), {options.voxelSize});
-    const auto ring = makeThing(shapes::torus(major, minor, 48, 20), {options.voxelSize});
+    const auto ground = makePrototype(shapes::box({halfSide, halfSide, halfFloor}), {coarse * options.voxelSize});
+    const auto pole = makePrototype(shapes::cylinder(poleRadius, top, 48), {options.voxelSize});
+    const auto ring = makePrototype(shapes::torus(major, minor, 48, 20), {options.voxelSize});
 
     stage.add(ground, {}, {{0, 0, -halfFloor}}, floorLook);
     for (int i = 0; i < poles; ++i) stage.add(pole, {}, {{placeOf(i, options.rows), top / 2}}, poleLook);

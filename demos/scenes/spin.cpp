@@ -66,8 +66,8 @@ Outcome spin(const SpinOptions& options) {
     stage.world().bullet().setGravity({0, 0, 0});
     const bullet::WorldExtensions keeps(stage.world().bullet(),
                                         {.continuousCollision = false, .gyroscopicIntegration = true});
-    const auto thing = makeThing(handle(), {options.voxelSize});
-    btRigidBody& body = stage.add(thing, {.mass = mass, .linearDamping = 0, .angularDamping = 0}, {},
+    const auto prototype = makePrototype(handle(), {options.voxelSize});
+    btRigidBody& body = stage.add(prototype, {.mass = mass, .linearDamping = 0, .angularDamping = 0}, {},
                                   {.colour = 0xf2cc8f, .roughness = 0.4f, .clearcoat = 0.4f});
     // the body's axes are the principal axes, in ascending order of their moments
     body.setActivationState(DISABLE_DEACTIVATION);
@@ -92,10 +92,11 @@ Outcome spin(const SpinOptions& options) {
 
     Outcome outcome = stage.finish({.distance = 1.2f, .elevation = 0.4f, .groundHeight = -0.5f});
     outcome.facts.emplace_back("turned over", fmt::format("{} times", turns));
-    outcome.criteria = {{"drift of angular momentum a minute", 100 * drift * 60 / stage.time(), 1, "%"},
-                        {"did not turn over", double(turns == 0), 0},
-                        {"error of the field's mass and inertia",
-                         100 * difference(massProperties(thing->field), massProperties(thing->mesh)), 0.5, "%"}};
+    outcome.criteria = {
+        {"drift of angular momentum a minute", 100 * drift * 60 / stage.time(), 1, "%"},
+        {"did not turn over", double(turns == 0), 0},
+        {"error of the field's mass and inertia",
+         100 * difference(massProperties(prototype->field), massProperties(prototype->mesh)), 0.5, "%"}};
     return outcome;
 }
 

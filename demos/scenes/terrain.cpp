@@ -115,7 +115,7 @@ std::vector<Rider> addRiders(Stage& stage, const Waves& waves, const TerrainOpti
     for (std::size_t i = 0; i < all.size(); ++i) {
         if (options.rolls && all[i].radius == 0) continue;
         const float y = lane * (float(i) - 0.5f * float(all.size() - 1));
-        const auto thing = makeThing(all[i].mesh, {options.voxelSize});
+        const auto prototype = makePrototype(all[i].mesh, {options.voxelSize});
         float lowest = 0, farthest = 0;
         for (const glm::vec3& p : all[i].mesh.points) {
             lowest = std::min(lowest, p.z);
@@ -123,7 +123,7 @@ std::vector<Rider> addRiders(Stage& stage, const Waves& waves, const TerrainOpti
         }
         const float z = waves.highestAround(startX, y, farthest) - lowest;
         const Matter matter{.mass = 1, .friction = frictionOf(options), .linearDamping = 0, .angularDamping = 0};
-        btRigidBody& body = stage.add(thing, matter, {{startX, y, z}}, {.colour = all[i].colour});
+        btRigidBody& body = stage.add(prototype, matter, {{startX, y, z}}, {.colour = all[i].colour});
         body.setActivationState(DISABLE_DEACTIVATION);
         body.setLinearVelocity({options.speed, 0, 0});
         body.setLinearFactor({1, 0, 1});  // moves as between frictionless rails: slopes would move it into other lanes
@@ -169,7 +169,7 @@ Outcome terrain(const TerrainOptions& options) {
                                             .framesPerMeasuring = 4,
                                             .smoothGround = options.smoothGround});
     const Waves waves({options.height, options.cell, options.heightField});
-    const btRigidBody& ground = stage.add(makeThing(waves.solid(), waves.shape(), groundVoxel),
+    const btRigidBody& ground = stage.add(makePrototype(waves.solid(), waves.shape(), groundVoxel),
                                           {.friction = frictionOf(options)}, {}, groundLook);
     std::vector<Rider> riders = addRiders(stage, waves, options);
     stage.run(settled);
@@ -194,7 +194,7 @@ Outcome terrain(const TerrainOptions& options) {
     outcome.facts = std::move(facts);
     outcome.criteria = {{"error of the speed, by energy, against a frictionless point", worst, maxSpeedError, "%"},
                         {"contacts with normals unlike the ground's", double(ghosts), 0},
-                        {"deepest overlap", outcome.deepest() / options.voxelSize, maxPenetration, "voxels"},
+                        {"deepest penetration", outcome.deepest() / options.voxelSize, maxPenetration, "voxels"},
                         {"rise of energy", outcome.energies.rise(), maxEnergyRise}};
     return outcome;
 }

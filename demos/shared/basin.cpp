@@ -32,7 +32,7 @@ constexpr float minOpen = 0.02f;  // min open fraction of a face: below, pressur
 constexpr double flat = 1e-3;     // min slope of a distance that defines a direction
 
 // Returns the open faces of the box alone.
-Vec3SGrid::Ptr openFacesOf(const CoordBBox& box, const openvdb::math::Transform& cells) {
+Vec3SGrid::Ptr faceFluidFractionsOf(const CoordBBox& box, const openvdb::math::Transform& cells) {
     const Vec3SGrid::Ptr open = Vec3SGrid::create(Vec3f(0));
     open->setTransform(cells.copy());
     open->setGridClass(openvdb::GRID_STAGGERED);
@@ -99,7 +99,7 @@ Vec3d normalAt(const FloatGrid::ConstAccessor& distance, const Vec3d& point, dou
 Basin::Basin(const openvdb::math::Transform& cells, const Coord& size)
     : box_(Coord(0), size.offsetBy(-1)),
       room_(levelSetOf(box_, cells)),
-      empty_(openFacesOf(box_, cells)),
+      empty_(faceFluidFractionsOf(box_, cells)),
       open_(empty_),
       solid_{openvdb::createLevelSet<FloatGrid>(cells.voxelSize()[0]), Vec3SGrid::create(Vec3f(0)), nullptr, nullptr} {}
 
@@ -120,7 +120,7 @@ void Basin::place(const fluid::Solid& solid) {
     solid_.velocity = nextToWalls(*solid.velocity);
     open_ = empty_->deepCopy();
     auto open = open_->getAccessor();
-    for (auto faces = solid.openFaces->cbeginValueOn(); faces; ++faces) {
+    for (auto faces = solid.faceFluidFraction->cbeginValueOn(); faces; ++faces) {
         CoordBBox reach;
         faces.getBoundingBox(reach);
         reach.intersect(box_);
@@ -132,7 +132,7 @@ void Basin::place(const fluid::Solid& solid) {
     }
 }
 
-void Basin::continueBehindWalls(FloatGrid& liquid) const {
+void Basin::extendBehindWalls(FloatGrid& liquid) const {
     const FloatGrid::Ptr before = liquid.deepCopy();
     continueInBody(liquid, *before);
     const auto known = liquid.getConstAccessor();
@@ -169,7 +169,7 @@ void Basin::continueInBody(FloatGrid& liquid, const FloatGrid& before) const {
     }
 }
 
-void Basin::continueBehindWalls(FaceVelocity& velocity) const {
+void Basin::extendBehindWalls(FaceVelocity& velocity) const {
     slideAlongBody(velocity);
     const CoordBBox whole = withWalls(box_);
     for (int axis = 0; axis < 3; ++axis) {

@@ -27,10 +27,10 @@ class Basin {
 
     /// Extends a level set behind the walls by mirroring, and into the body's skin by its slope outside. Liquid that
     /// touches a wall then has no surface there.
-    void continueBehindWalls(openvdb::FloatGrid& liquid) const;
+    void extendBehindWalls(openvdb::FloatGrid& liquid) const;
     /// Extends the liquid's velocity in the same way, so that no liquid crosses the walls. Behind the box's walls the
     /// normal component is reversed. In the body it is the body's own.
-    void continueBehindWalls(FaceVelocity& velocity) const;
+    void extendBehindWalls(FaceVelocity& velocity) const;
 
     /// Returns the part of a level set that is inside the box and outside the body.
     openvdb::FloatGrid::Ptr inside(const openvdb::FloatGrid& liquid) const;

@@ -60,7 +60,7 @@ class Specimen {
     const ExactDistance& distance() const { return distance_; }
     std::span<const glm::dvec3> points() const { return points_; }
 
-    /// Returns the max depth of this body's surface points below the surface of another body, or `least` if that is
+    /// Returns the max depth of this body's surface points below the surface of another body, or `minimum` if that is
     /// greater [m].
     double deepestIn(const ExactDistance& other, const Pose& self, const Pose& otherPose, double minimum = 0) const;
 
@@ -81,7 +81,7 @@ class Specimen {
 };
 
 /// Returns the penetration depth: the max depth of the surface points of either body below the surface of the other, or
-/// `least` if that is greater [m].
+/// `minimum` if that is greater [m].
 double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB, double minimum = 0);
 
 }  // namespace bilayer::demo

@@ -358,7 +358,7 @@ Mesh carvedBox(std::size_t triangles, float radius) {
 
 Mesh unevenSphere(float deviation, std::size_t triangles) {
     if (triangles < 100 || triangles % 2)
-        throw std::invalid_argument("an uneven sphere has 100 triangles or more, evenly");
+        throw std::invalid_argument("an uneven sphere needs an even count of at least 100 triangles");
     const Mesh even = ringedSphere(triangles);
     float low = 1, high = 16;
     if (!(deviation >= deviationOfAreas(even) && deviation <= deviationOfAreas(grownBelow(even, high))))

@@ -41,7 +41,7 @@ std::string grouped(std::uint64_t count) {
 
 }  // namespace
 
-std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
+std::shared_ptr<const BodyPrototype> makePrototype(Mesh mesh, const PrototypeOptions& options) {
     BuildOptions band;
     band.voxelSize = options.voxelSize;
     band.interiorWidthVoxels = options.interiorWidthVoxels;
@@ -53,13 +53,16 @@ std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
                                        .restingFriction = options.restingFriction};
     auto shape = std::make_shared<bullet::Shape>(collider, centred);
     Specimen specimen(mesh, specimenSpacing * options.voxelSize);
-    return std::make_shared<Thing>(Thing{std::move(mesh), std::move(field), std::move(shape), std::move(specimen)});
+    return std::make_shared<BodyPrototype>(
+        BodyPrototype{std::move(mesh), std::move(field), std::move(shape), std::move(specimen)});
 }
 
-std::shared_ptr<const Thing> makeThing(Mesh mesh, std::shared_ptr<btCollisionShape> shape, float voxelSize) {
+std::shared_ptr<const BodyPrototype> makePrototype(Mesh mesh, std::shared_ptr<btCollisionShape> shape,
+                                                   float voxelSize) {
     LevelSet field = build(mesh, {.voxelSize = voxelSize});
     Specimen specimen(mesh, specimenSpacing * voxelSize);
-    return std::make_shared<Thing>(Thing{std::move(mesh), std::move(field), std::move(shape), std::move(specimen)});
+    return std::make_shared<BodyPrototype>(
+        BodyPrototype{std::move(mesh), std::move(field), std::move(shape), std::move(specimen)});
 }
 
 Stage::Stage(std::string title, const StageOptions& options)
@@ -69,15 +72,16 @@ Stage::Stage(std::string title, const StageOptions& options)
     outcome_.fingerprint = fnvStart;
 }
 
-btRigidBody& Stage::add(std::shared_ptr<const Thing> thing, const Matter& matter, const Pose& pose, const Look& look) {
-    const double voxel = thing->field.voxelSize();
+btRigidBody& Stage::add(std::shared_ptr<const BodyPrototype> prototype, const Matter& matter, const Pose& pose,
+                        const Look& look) {
+    const double voxel = prototype->field.voxelSize();
     outcome_.voxelSize = bodies_.empty() ? voxel : std::min(outcome_.voxelSize, voxel);
     outcome_.bodies += matter.mass > 0;
     // above this penetration, 4 cm by default, Bullet converts penetration into velocity
     world_.bullet().getSolverInfo().m_splitImpulsePenetrationThreshold = -float(outcome_.voxelSize);
 
-    btRigidBody& body = world_.add(thing->shape, matter, pose);
-    bodies_.push_back({std::move(thing), look, matter.mass > 0});
+    btRigidBody& body = world_.add(prototype->shape, matter, pose);
+    bodies_.push_back({std::move(prototype), look, matter.mass > 0});
     return body;
 }
 
@@ -120,7 +124,7 @@ std::vector<double> Stage::penetrationsIn(const std::vector<Pose>& poses) const 
     };
     std::vector<Ball> balls;
     for (std::size_t i = 0; i < poses.size(); ++i) {
-        const ExactDistance& mesh = bodies_[i].thing->specimen.distance();
+        const ExactDistance& mesh = bodies_[i].prototype->specimen.distance();
         const glm::vec3 centre(0.5 * (mesh.lower() + mesh.upper()));
         balls.push_back({poses[i].toWorld(centre), float(0.5 * glm::distance(mesh.lower(), mesh.upper()))});
     }
@@ -132,7 +136,7 @@ std::vector<double> Stage::penetrationsIn(const std::vector<Pose>& poses) const 
             if (!bodies_[i].moves && !bodies_[j].moves) continue;
             if (glm::distance(balls[i].centre, balls[j].centre) > balls[i].radius + balls[j].radius) continue;
             const double depth =
-                penetration(bodies_[i].thing->specimen, poses[i], bodies_[j].thing->specimen, poses[j]);
+                penetration(bodies_[i].prototype->specimen, poses[i], bodies_[j].prototype->specimen, poses[j]);
             if (depth > 0) depths.push_back(depth);
         }
     return depths;
@@ -143,16 +147,16 @@ Recording Stage::record(const View& view) const {
     recording.view = view;
     recording.note("bodies", std::to_string(outcome_.bodies));
     recording.note("time per step", fmt::format("{:.1f} ms", outcome_.medianStep()));
-    std::map<const Thing*, int> meshes;
-    std::set<const Thing*> kinds;  // of dynamic bodies
+    std::map<const BodyPrototype*, int> meshes;
+    std::set<const BodyPrototype*> kinds;  // of dynamic bodies
     std::uint64_t triangles = 0, voxels = 0;
-    for (const auto& [thing, look, moves] : bodies_) {
-        if (!meshes.contains(thing.get())) meshes[thing.get()] = recording.addMesh(thing->mesh);
-        if (moves && kinds.insert(thing.get()).second) {
-            triangles += thing->mesh.triangles.size();
-            voxels += thing->field.activeVoxels();
+    for (const auto& [prototype, look, moves] : bodies_) {
+        if (!meshes.contains(prototype.get())) meshes[prototype.get()] = recording.addMesh(prototype->mesh);
+        if (moves && kinds.insert(prototype.get()).second) {
+            triangles += prototype->mesh.triangles.size();
+            voxels += prototype->field.activeVoxels();
         }
-        recording.addBody(meshes[thing.get()], look);
+        recording.addBody(meshes[prototype.get()], look);
     }
     const std::string of = kinds.size() == 1 ? " each" : fmt::format(" in {} kinds", kinds.size());
     recording.note("triangles", grouped(triangles) + of);

@@ -17,7 +17,7 @@
 
 namespace bilayer::demo {
 
-struct ThingOptions {
+struct PrototypeOptions {
     float voxelSize;                ///< [m]
     float interiorWidthVoxels = 6;  ///< of the band; bodies that penetrate deeper are not detected [voxels]
     float margin = -1;              ///< contact margin [m]; negative: one voxel
@@ -27,7 +27,7 @@ struct ThingOptions {
 };
 
 /// The geometry that bodies share: the shape that Bullet collides, and the reference data for measurements.
-struct Thing {
+struct BodyPrototype {
     Mesh mesh;
     LevelSet field;
     std::shared_ptr<btCollisionShape> shape;
@@ -35,9 +35,9 @@ struct Thing {
 };
 
 /// Makes a Bullet shape from a mesh. Throws as build() does.
-std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options);
+std::shared_ptr<const BodyPrototype> makePrototype(Mesh mesh, const PrototypeOptions& options);
 /// Wraps a native Bullet shape and its mesh. Bullet does not use the field. Throws as build() does.
-std::shared_ptr<const Thing> makeThing(Mesh mesh, std::shared_ptr<btCollisionShape> shape, float voxelSize);
+std::shared_ptr<const BodyPrototype> makePrototype(Mesh mesh, std::shared_ptr<btCollisionShape> shape, float voxelSize);
 
 struct StageOptions {
     float stepsPerSecond = 240;
@@ -51,7 +51,8 @@ class Stage {
     explicit Stage(std::string title, const StageOptions& options = {});
 
     /// Adds a body at a pose. The reference is valid as long as the stage. Call this before the first step.
-    btRigidBody& add(std::shared_ptr<const Thing> thing, const Matter& matter, const Pose& pose, const Look& look);
+    btRigidBody& add(std::shared_ptr<const BodyPrototype> prototype, const Matter& matter, const Pose& pose,
+                     const Look& look);
 
     void step();
     /// Steps until this time since the start has passed, or until `done` returns true. It is called after each step.
@@ -69,7 +70,7 @@ class Stage {
 
   private:
     struct Body {
-        std::shared_ptr<const Thing> thing;
+        std::shared_ptr<const BodyPrototype> prototype;
         Look look;
         bool moves;
     };

@@ -27,16 +27,16 @@ void addTo(FloatGrid& grid, float value) {
 
 Water::Water(const FloatGrid& surface, const Basin& basin, const WaterOptions& options)
     : options_(options), surface_(surface.deepCopy()), velocity_(surface.transform()) {
-    basin.continueBehindWalls(*surface_);
+    basin.extendBehindWalls(*surface_);
     measure(basin);
     if (!(options_.volume > 0)) options_.volume = volume_;
     // at rest, as far as the surface may move in the first step
     pressure_.project(velocity_, *surface_, basin);
     extrapolate(velocity_, bandLayers + 1);
-    basin.continueBehindWalls(velocity_);
+    basin.extendBehindWalls(velocity_);
 }
 
-void Water::carrySurface(float seconds) {
+void Water::advectSurface(float seconds) {
     using Field = openvdb::tools::DiscreteField<Vec3SGrid>;
     const Vec3SGrid::Ptr velocity = velocity_.atCentres();
     openvdb::tools::LevelSetAdvection<FloatGrid, Field> advection(*surface_, Field(*velocity));
@@ -60,8 +60,8 @@ void Water::measure(const Basin& basin) {
 }
 
 Projection Water::step(const Basin& basin, float seconds) {
-    carrySurface(seconds);
-    basin.continueBehindWalls(*surface_);
+    advectSurface(seconds);
+    basin.extendBehindWalls(*surface_);
     measure(basin);
 
     velocity_ = advected(velocity_, seconds);
@@ -73,7 +73,7 @@ Projection Water::step(const Basin& basin, float seconds) {
 
     const int moved = int(std::ceil(velocity_.fastest() * seconds / surface_->voxelSize()[0]));
     extrapolate(velocity_, bandLayers + moved);
-    basin.continueBehindWalls(velocity_);
+    basin.extendBehindWalls(velocity_);
     return projection;
 }
 

@@ -33,14 +33,14 @@ class Water {
 
     /// Returns the part of the liquid that is inside the box and outside the body, as a level set.
     const openvdb::FloatGrid& shape() const { return *shape_; }
-    double volume() const { return volume_; }        ///< enclosed by the surface of shape(), computed from a mesh [m^3]
-    double kept() const { return options_.volume; }  ///< the target volume [m^3]
+    double volume() const { return volume_; }  ///< enclosed by the surface of shape(), computed from a mesh [m^3]
+    double targetVolume() const { return options_.volume; }  ///< the target volume [m^3]
     double restored() const { return restored_; }  ///< volume restored so far; removed volume counts as negative [m^3]
     /// Returns the max speed of the liquid's faces [m/s].
     float fastest() const { return velocity_.fastest(); }
 
   private:
-    void carrySurface(float seconds);
+    void advectSurface(float seconds);
     double growth() const;
     void measure(const Basin& basin);
 

@@ -36,6 +36,51 @@ bool isOfGhost(btOverlappingPairCache& cache) {
     return owns(pair.m_pProxy0) || owns(pair.m_pProxy1);
 }
 
+/// The tasks of all pairs of shapes with a field, of overlapping pairs whose algorithm is ours.
+std::vector<Task> tasksOf(btOverlappingPairCache& cache, btDispatcher& dispatcher, float seconds) {
+    std::vector<Task> tasks;
+    for (int i = 0; i < cache.getNumOverlappingPairs(); ++i) {
+        btBroadphasePair& overlap = cache.getOverlappingPairArrayPtr()[i];
+        auto* first = static_cast<btCollisionObject*>(overlap.m_pProxy0->m_clientObject);
+        auto* second = static_cast<btCollisionObject*>(overlap.m_pProxy1->m_clientObject);
+        if (!holdsField(*first->getCollisionShape()) && !holdsField(*second->getCollisionShape())) continue;
+        if (!dispatcher.needsCollision(first, second)) continue;
+        const btCollisionObjectWrapper one(nullptr, first->getCollisionShape(), first, first->getWorldTransform(), -1,
+                                           -1);
+        const btCollisionObjectWrapper two(nullptr, second->getCollisionShape(), second, second->getWorldTransform(),
+                                           -1, -1);
+        if (!overlap.m_algorithm)
+            overlap.m_algorithm = dispatcher.findAlgorithm(&one, &two, nullptr, BT_CONTACT_POINT_ALGORITHMS);
+        // else it is GImpact's, which calls us for its parts, or one that the user has registered
+        if (auto* algorithm = dynamic_cast<FieldAlgorithm*>(overlap.m_algorithm))
+            algorithm->gather(one, two, seconds, tasks);
+    }
+    return tasks;
+}
+
+/// Finds the contacts of all tasks, in parallel except for shapes that lock. Samples all pairs first, if the sampler
+/// works.
+void collideAll(const std::vector<Task>& tasks, SampledPairs& sampled) {
+    std::vector<std::optional<std::size_t>> samples(tasks.size());  // numbers of the sampled pairs
+    sampled.clear();
+    if (sampled.works())
+        for (std::size_t i = 0; i < tasks.size(); ++i)
+            if (const auto& [pair, a, b] = tasks[i]; isField(*a.shape))
+                samples[i] = sampled.add(a.placed(), b.placed(), marginOf(a, b));
+    const bool areSampled = sampled.sample();
+    const auto collide = [&](std::size_t i) {
+        const auto& [pair, a, b] = tasks[i];
+        if (areSampled && samples[i])
+            pair->collide(a, b, sampled, *samples[i]);
+        else
+            pair->collide(a, b);
+    };
+    std::vector<std::size_t> parallel, serial;
+    for (std::size_t i = 0; i < tasks.size(); ++i) (locks(*tasks[i].a.shape) ? serial : parallel).push_back(i);
+    tbb::parallel_invoke([&] { std::for_each(serial.begin(), serial.end(), collide); },
+                         [&] { tbb::parallel_for_each(parallel, collide); });
+}
+
 }  // namespace
 
 struct Dispatcher::Functions : FieldAlgorithmFunctions {
@@ -69,42 +114,8 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     functions_->state = {
         .running = {}, .seconds = isStep ? info.m_timeStep : 0, .speculatesOnAll = !ContinuousCollision::serves(*this)};
 
-    std::vector<Task> tasks;
-    for (int i = 0; i < cache->getNumOverlappingPairs(); ++i) {
-        btBroadphasePair& overlap = cache->getOverlappingPairArrayPtr()[i];
-        auto* first = static_cast<btCollisionObject*>(overlap.m_pProxy0->m_clientObject);
-        auto* second = static_cast<btCollisionObject*>(overlap.m_pProxy1->m_clientObject);
-        if (!holdsField(*first->getCollisionShape()) && !holdsField(*second->getCollisionShape())) continue;
-        if (!needsCollision(first, second)) continue;
-        const btCollisionObjectWrapper one(nullptr, first->getCollisionShape(), first, first->getWorldTransform(), -1,
-                                           -1);
-        const btCollisionObjectWrapper two(nullptr, second->getCollisionShape(), second, second->getWorldTransform(),
-                                           -1, -1);
-        if (!overlap.m_algorithm) overlap.m_algorithm = findAlgorithm(&one, &two, nullptr, BT_CONTACT_POINT_ALGORITHMS);
-        // else it is GImpact's, which calls us for its parts, or one that the user has registered
-        if (auto* algorithm = dynamic_cast<FieldAlgorithm*>(overlap.m_algorithm))
-            algorithm->gather(one, two, functions_->state.seconds, tasks);
-    }
-    std::vector<std::optional<std::size_t>> numbers(tasks.size());  // numbers of the sampled pairs
-    SampledPairs& sampled = functions_->sampledPairs;
-    sampled.clear();
-    if (sampled.works())
-        for (std::size_t i = 0; i < tasks.size(); ++i)
-            if (const auto& [pair, a, b] = tasks[i]; isField(*a.shape))
-                numbers[i] = sampled.add(a.placed(), b.placed(), marginOf(a, b));
-    const bool areSampled = sampled.sample();
-    const auto collide = [&](std::size_t i) {
-        const auto& [pair, a, b] = tasks[i];
-        if (areSampled && numbers[i])
-            pair->collide(a, b, sampled, *numbers[i]);
-        else
-            pair->collide(a, b);
-    };
-    std::vector<std::size_t> free, locking;
-    for (std::size_t i = 0; i < tasks.size(); ++i) (locks(*tasks[i].a.shape) ? locking : free).push_back(i);
-    tbb::parallel_invoke([&] { std::for_each(locking.begin(), locking.end(), collide); },
-                         [&] { tbb::parallel_for_each(free, collide); });
-
+    const std::vector<Task> tasks = tasksOf(*cache, *this, functions_->state.seconds);
+    collideAll(tasks, functions_->sampledPairs);
     btCollisionDispatcher::dispatchAllCollisionPairs(cache, info, dispatcher);
 
     for (const Task& task : tasks) task.pair->forget();
@@ -120,7 +131,7 @@ const DispatchStatistics& Dispatcher::statistics() const {
 
 FieldAlgorithms::FieldAlgorithms(btCollisionDispatcher& dispatcher)
     : dispatcher_(dispatcher), functions_(std::make_unique<Functions>(*dispatcher.getCollisionConfiguration())) {
-    functions_->state.isForeign = true;
+    functions_->state.hasOtherDispatcher = true;
     registerFields();
 }
 

@@ -14,7 +14,7 @@ namespace bilayer::bullet {
 /// What is drawn, and in which colours.
 struct DrawOptions {
     bool band = true;                      ///< outline of the leaves that hold the band
-    bool points = false;                   ///< surface points, drawn as normals as long as the point spacing
+    bool points = false;                   ///< surface points, drawn as normals of one voxel's length
     btVector3 bandColour{0.3f, 0.6f, 1};   ///< red, green, blue: 0..1
     btVector3 pointColour{1, 0.6f, 0.2f};  ///< of surface points
     btVector3 sharpColour{1, 0.2f, 0.2f};  ///< for points on convex edges and vertices

@@ -62,7 +62,7 @@ class WorldExtensions::Hook : public btActionInterface {
     /// The pre-tick callbacks of a world.
     struct PreTicks {
         std::vector<Hook*> hooks;
-        btInternalTickCallback users = nullptr;
+        btInternalTickCallback usersCallback = nullptr;
     };
 
     static void preTick(btDynamicsWorld* world, btScalar seconds) {
@@ -71,7 +71,7 @@ class WorldExtensions::Hook : public btActionInterface {
             const std::lock_guard lock(mutex_);
             if (const auto found = worlds_.find(world); found != worlds_.end()) all = found->second;
         }
-        if (all.users) all.users(world, seconds);
+        if (all.usersCallback) all.usersCallback(world, seconds);
         for (Hook* hook : all.hooks) {
             if (hook->collision) hook->collision->beforeStep();
             if (hook->gyroscopic_) hook->gyroscopic_->beforeStep(seconds);
@@ -102,7 +102,7 @@ class WorldExtensions::Hook : public btActionInterface {
         PreTicks& all = worlds_.at(&world_);
         std::erase(all.hooks, this);
         if (!all.hooks.empty()) return;
-        if (PreTick::of(world_) == preTick) PreTick::of(world_) = all.users;
+        if (PreTick::of(world_) == preTick) PreTick::of(world_) = all.usersCallback;
         worlds_.erase(&world_);
     }
 
@@ -110,7 +110,7 @@ class WorldExtensions::Hook : public btActionInterface {
     void takePreTick(PreTicks& all) {
         btInternalTickCallback& current = PreTick::of(world_);
         if (current == preTick) return;
-        all.users = current;
+        all.usersCallback = current;
         current = preTick;
     }
 

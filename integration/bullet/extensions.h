@@ -53,14 +53,14 @@ struct ExtensionOptions {
     /// block that slides over waves of 0.1 m on cells of its own size loses up to 71 % of its speed in 3 s. At the end
     /// of each step, the linear velocity gets back what the step's impulses have taken.
     ///
-    /// - Edges whose faces differ by less than 20 degrees count: the sharpest one of the ground below or just behind,
-    ///   the sharpest one of the body's own triangle at the contact, and for a body with such edges its rotation in a
-    ///   step. Impacts get back up to eight times the energy that an edge with the sum of these angles can take at the
-    ///   body's speed, and that of a body that tips over it. So a drop on the ground is an impact as usual, and a flat
-    ///   floor gives nothing back to a box.
-    /// - A body that rolls also gets back what friction takes at such impacts: where its contact point slips by no more
-    ///   than they cause, which is the square of the sum's tangent, in parts of the speed. Friction that brakes a
-    ///   sliding body counts as usual.
+    /// - Edges whose faces differ by less than 20 degrees count. Let a be the sum of three angles: that of the sharpest
+    ///   edge of the ground below or just behind; that of the sharpest edge of the body's own triangle at the contact;
+    ///   and, if the body has such an edge, the body's rotation in a step.
+    /// - Impacts get back up to eight times the energy that an edge of the angle a can take at the body's speed, and up
+    ///   to the energy that a body takes to tip over such an edge. So a drop on the ground is an impact as usual, and a
+    ///   flat floor gives nothing back to a box.
+    /// - A body that rolls also gets back what friction takes at such impacts, if its contact point slips by at most
+    ///   tan^2(a) of the speed. Friction that brakes a sliding body counts as usual.
     /// - A body that is slower along the ground than gravity accelerates it in two steps gets nothing.
     /// - The kinetic energy of a body changes by half in a step at most.
     /// - Contacts, normals and positions of the step stay as they are.
@@ -86,9 +86,9 @@ struct ExtensionOptions {
 };
 
 /// Extends a world from its construction on. The world must outlive it. The user's own tick callbacks keep working,
-/// whether they are set before or after: pre-tick callbacks run before the extensions, others after them. Set a
-/// pre-tick callback once: one that is set again before each step keeps smooth ground and gyroscopic integration out of
-/// these steps.
+/// whether they are set before or after: pre-tick callbacks run before the extensions, others after them. A
+/// pre-tick callback that is set later keeps smooth ground and gyroscopic integration out of the next step. So set it
+/// once: set again before each step, it keeps them out of all.
 ///
 /// A world may have several of these; smooth ground acts once. Only one of them may have
 /// ExtensionOptions::gyroscopicIntegration, since each integrator takes over the rotation of all bodies: the

@@ -97,8 +97,8 @@ void estimate(const MeshReport& mesh, Settings& settings) {
 void warnOfMesh(const MeshReport& mesh, std::vector<std::string>& warnings) {
     if (!mesh.closed())
         warnings.push_back(
-            fmt::format("the mesh is not closed ({}): signs are a guess, and only a static body needs no "
-                        "mass",
+            fmt::format("the mesh is not closed ({}): signs are a guess, and it may have no mass, which only a static "
+                        "body does without",
                         verdict(mesh)));
     else if (!mesh.oriented() || mesh.selfIntersections > 0)
         warnings.push_back(fmt::format("the mesh is not clean: {}", verdict(mesh)));

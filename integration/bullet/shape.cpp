@@ -16,6 +16,7 @@
 #include <glm/mat3x3.hpp>
 #include <mutex>
 #include <stdexcept>
+#include <string>
 
 #include "collider/contact/collider_data.h"
 #include "collider/field/field_data.h"
@@ -111,7 +112,7 @@ void castRay(const Placed& body, const MeshTree& mesh, btTriangleRaycastCallback
 }
 
 /// Returns false if the callback also wants what lies behind the hit.
-bool report(const std::optional<SweepHit>& hit, btTriangleConvexcastCallback& callback) {
+bool report(const std::optional<CastHit>& hit, btTriangleConvexcastCallback& callback) {
     if (!hit || !(hit->fraction < callback.m_hitFraction)) return true;
     callback.m_hitFraction =
         callback.reportHit(toBullet(hit->normal), toBullet(hit->position), hit->fraction, 0, hit->triangle);
@@ -123,14 +124,14 @@ bool castSphere(const Placed& body, const MeshTree* mesh, float radius, btTriang
     const glm::vec3 from = toGlm(callback.m_convexShapeFrom.getOrigin());
     const glm::vec3 to = toGlm(callback.m_convexShapeTo.getOrigin());
     if (!mesh) {
-        if (!sweepable(body, radius)) return false;
-        return report(sweepSphere(body, from, to, radius, callback.m_allowedPenetration), callback);
+        if (!bandFitsSphere(body, radius)) return false;
+        return report(castSphereOn(body, from, to, radius, callback.m_allowedPenetration), callback);
     }
     const float reach = (radius - callback.m_allowedPenetration) / body.scale;
     const glm::vec3 start = body.pose.toBody(from) / body.scale;
     // A sphere that touches at the start may separate, or hit other triangles: Bullet tests them one by one.
     if (!(reach > 0) || touches(*mesh, start, reach)) return false;
-    auto hit = sweepSphere(*mesh, start, body.pose.toBody(to) / body.scale, reach);
+    auto hit = castSphereOn(*mesh, start, body.pose.toBody(to) / body.scale, reach);
     if (hit) {
         hit->position = body.pose.toWorld(body.scale * hit->position);
         hit->normal = body.pose.rotation * hit->normal;
@@ -245,9 +246,11 @@ Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& optio
       restingFriction_(options.restingFriction),
       triangles_(std::make_unique<Triangles>()) {
     if (!collider_) throw std::invalid_argument("Shape: no collider");
-    if (!std::isfinite(options.margin)) throw std::invalid_argument("Shape: the margin is not finite");
+    if (!std::isfinite(options.margin))
+        throw std::invalid_argument("Shape: the margin is " + std::to_string(options.margin) + ", and must be finite");
     if (!(restingFriction_ >= 1) || !std::isfinite(restingFriction_))
-        throw std::invalid_argument("Shape: the friction at rest must be 1 or more");
+        throw std::invalid_argument("Shape: the friction at rest is " + std::to_string(restingFriction_) +
+                                    ", and must be finite and at least 1");
     // Not the type for custom concave shapes, which Bullet always takes for its own btSdfCollisionShape. Nothing else
     // in Bullet uses this type.
     m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;

@@ -32,7 +32,9 @@ constexpr int spareLayers = 1, maxLayers = 1 << 20;
 void check(const openvdb::FloatGrid& band, const openvdb::CoordBBox& box) {
     const auto range = openvdb::tools::minMax(band.tree());
     if (!(range.min() < 0 && range.max() > 0))
-        throw std::invalid_argument("distances grow from where inside meets outside, and this field has no inside");
+        throw std::invalid_argument(
+            fmt::format("distances grow from where inside meets outside, and this field has no {}",
+                        range.min() < 0 ? "outside" : "inside"));
     const openvdb::Vec3d size = box.extents().asVec3d();
     const double bytes = size.x() * size.y() * size.z() * bytesPerVoxel;
     const double memory = usableMemory();
@@ -72,7 +74,7 @@ LevelSet extend(const LevelSet& levelSet) {
 
 LevelSet extend(const LevelSet& levelSet, float distance) {
     if (!(distance > 0) || !std::isfinite(distance))
-        throw std::invalid_argument("the distance to extend to must be positive");
+        throw std::invalid_argument(fmt::format("the distance to extend to must be positive, not {:g}", distance));
     const openvdb::FloatGrid& band = *levelSet.grids().distance;
     const float exterior = std::max(distance, levelSet.exteriorWidth()),
                 interior = std::max(distance, levelSet.interiorWidth());
@@ -80,7 +82,9 @@ LevelSet extend(const LevelSet& levelSet, float distance) {
     const double layers = std::ceil((double(distance) - double(narrower)) / double(levelSet.voxelSize())) + spareLayers;
     openvdb::CoordBBox box = band.evalActiveVoxelBoundingBox();
     if (layers > double(maxLayers))
-        throw std::invalid_argument("the distance to extend to is too far for these voxels");
+        throw std::invalid_argument(
+            fmt::format("the distance to extend to, {:g}, is too far for voxels of {:g}: at most {} voxels", distance,
+                        levelSet.voxelSize(), maxLayers));
     box.expand(std::max(int(layers), 0));
     check(band, box);
     if (layers <= spareLayers) return levelSet;

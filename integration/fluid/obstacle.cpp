@@ -73,13 +73,13 @@ double solidFraction(const Corners& corners, const int (&simplex)[n]) {
     return negativeFraction(values);
 }
 
-float openVolumeOf(const Corners& corners) {
+float cellFluidFractionOf(const Corners& corners) {
     double solid = 0;
     for (const auto& tetrahedron : tetrahedra) solid += solidFraction(corners, tetrahedron);
     return float(1 - solid / 6);
 }
 
-openvdb::Vec3f openFacesOf(const Corners& corners) {
+openvdb::Vec3f faceFluidFractionsOf(const Corners& corners) {
     openvdb::Vec3f open;
     for (int axis = 0; axis < 3; ++axis)
         open[axis] =
@@ -121,12 +121,12 @@ void addFluidFractions(Solid& solid, const FloatGrid& corners, const Transform& 
         auto& faceLeaf = faceLeaves.leaf(l);
         for (openvdb::Index i = 0; i < FloatTree::LeafNodeType::SIZE; ++i) {
             const Corners around = cornersOf(distances, leaf.offsetToGlobalCoord(i));
-            const float open = openVolumeOf(around);
-            const openvdb::Vec3f openFaces = openFacesOf(around);
+            const float open = cellFluidFractionOf(around);
+            const openvdb::Vec3f faceFluidFraction = faceFluidFractionsOf(around);
             leaf.setValueOnly(i, open);
             leaf.setActiveState(i, open < 1);
-            faceLeaf.setValueOnly(i, openFaces);
-            faceLeaf.setActiveState(i, openFaces != openvdb::Vec3f(1));
+            faceLeaf.setValueOnly(i, faceFluidFraction);
+            faceLeaf.setActiveState(i, faceFluidFraction != openvdb::Vec3f(1));
         }
     });
     auto tile = corners.tree().cbeginValueAll();
@@ -136,9 +136,9 @@ void addFluidFractions(Solid& solid, const FloatGrid& corners, const Transform& 
         volume->addTile(FloatTree::DEPTH - 1 - tile.getDepth(), tile.getCoord(), 0.f, true);
         faces->addTile(FloatTree::DEPTH - 1 - tile.getDepth(), tile.getCoord(), openvdb::Vec3f(0), true);
     }
-    solid.openVolume = named<FloatGrid>("open_volume", volume, cells);
-    solid.openFaces = named<Vec3SGrid>("open_faces", faces, cells);
-    solid.openFaces->setGridClass(openvdb::GRID_STAGGERED);
+    solid.cellFluidFraction = named<FloatGrid>("cell_fluid_fraction", volume, cells);
+    solid.faceFluidFraction = named<Vec3SGrid>("face_fluid_fraction", faces, cells);
+    solid.faceFluidFraction->setGridClass(openvdb::GRID_STAGGERED);
 }
 
 openvdb::Vec3d toVdb(const glm::vec3& v) {
@@ -178,8 +178,10 @@ void checkCells(const SolidOptions& options, const Transform& cells) {
         if (!(edge[axis] > (1 - axisTolerance) * voxel))
             throw std::invalid_argument("the cells' axes are not those of the world");
     }
-    const float lengths = glm::length(options.velocity.linear) + glm::length(options.velocity.angular);
-    if (!std::isfinite(lengths)) throw std::invalid_argument("the velocity is not finite");
+    const glm::vec3 &linear = options.velocity.linear, &angular = options.velocity.angular;
+    if (!std::isfinite(glm::length(linear) + glm::length(angular)))
+        throw std::invalid_argument(fmt::format("the velocity is not finite: ({}, {}, {}) m/s, ({}, {}, {}) rad/s",
+                                                linear.x, linear.y, linear.z, angular.x, angular.y, angular.z));
     if (!(options.halfWidthVoxels >= minHalfWidthVoxels && options.halfWidthVoxels <= maxHalfWidthVoxels))
         throw std::invalid_argument(
             fmt::format("halfWidthVoxels must be in 3..1000, not {:g}", options.halfWidthVoxels));

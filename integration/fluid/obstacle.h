@@ -24,8 +24,8 @@ struct Solid {
     openvdb::FloatGrid::Ptr distance;  ///< `solid`: level set at the cell centres, negative inside the body [m]
     /// `solid_velocity`: the body's velocity across each face in the band [m/s]; staggered
     openvdb::Vec3SGrid::Ptr velocity;
-    openvdb::Vec3SGrid::Ptr openFaces;   ///< `open_faces`: fluid fraction of each face, 0..1; staggered
-    openvdb::FloatGrid::Ptr openVolume;  ///< `open_volume`: fluid fraction of each cell, 0..1
+    openvdb::Vec3SGrid::Ptr faceFluidFraction;  ///< `face_fluid_fraction`: fluid fraction of each face, 0..1; staggered
+    openvdb::FloatGrid::Ptr cellFluidFraction;  ///< `cell_fluid_fraction`: fluid fraction of each cell, 0..1
 };
 
 /// Options of solid().
@@ -42,8 +42,9 @@ struct SolidOptions {
 /// integration over arbitrary domains", 2007, cut cells into tetrahedra. A plate thinner than a cell may lie between
 /// corners: there it closes no face.
 ///
-/// Active are the cells whose fluid fraction is below 1. Throws as regrid() does, for cells that are rotated against
-/// the world, for a velocity that is not finite, and for a half width out of 3..1000; and Cancelled.
+/// Active are the cells whose fluid fraction is below 1. Throws std::invalid_argument as seed() does for a mesh or a
+/// placement, for cells that are not cubes or rotated against the world, for a velocity that is not finite, and for a
+/// half width out of 3..1000; and Cancelled.
 Solid solid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& cells,
             const SolidOptions& options = {});
 /// The same from a field.

@@ -3,6 +3,7 @@
 // particle. The result is independent of the order of the voxels and the number of threads.
 #include <bilayer/integration/fluid/particles.h>
 
+#include <fmt/format.h>
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/tools/Interpolation.h>
@@ -16,6 +17,7 @@
 #include "collider/field/interpolant.h"
 #include "integration/fluid/detail/placement.h"
 #include "integration/fluid/detail/regrid.h"
+#include "sdf/base/hash.h"
 #include "sdf/base/openvdb_points.h"
 #include "sdf/base/progress.h"
 
@@ -37,17 +39,9 @@ constexpr double farOutside = 1;       // distance at a voxel's centre beyond wh
 constexpr int jitterBits = 21;         // bits of a coordinate: three fit into one hash
 constexpr double maxBlocks = 1 << 28;  // of a body's box in a solver's voxels
 
-// S. Vigna's splitmix64: every bit of the output depends on every bit of the input.
-std::uint64_t mix(std::uint64_t x) {
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-}
-
 std::uint64_t voxelKey(std::uint64_t seed, const Coord& voxel) {
-    std::uint64_t key = mix(seed);
-    for (int axis = 0; axis < 3; ++axis) key = mix(key ^ std::uint32_t(voxel[axis]));
+    std::uint64_t key = splitMix64(seed);
+    for (int axis = 0; axis < 3; ++axis) key = splitMix64(key ^ std::uint32_t(voxel[axis]));
     return key;
 }
 
@@ -63,7 +57,7 @@ Vec3d randomOffset(std::uint64_t bits) {
 void require(const openvdb::math::Transform& voxels, const ParticleOptions& options) {
     if (!voxels.isLinear() || !voxels.hasUniformScale()) throw std::invalid_argument("the voxels must be cubes");
     if (options.perVoxel < 1 || options.perVoxel > maxPerVoxel)
-        throw std::invalid_argument("perVoxel must be in 1..1000");
+        throw std::invalid_argument(fmt::format("perVoxel must be in 1..{}, not {}", maxPerVoxel, options.perVoxel));
 }
 
 // The leaves that may hold liquid, and the interior tiles cut into blocks of a leaf's size.
@@ -86,7 +80,8 @@ std::vector<Coord> blocks(const FloatGrid& liquid) {
 template <class Visit>
 void visitVoxel(const Coord& voxel, const ParticleOptions& options, Visit&& visit) {
     const std::uint64_t key = voxelKey(options.seed, voxel);
-    for (int i = 0; i < options.perVoxel; ++i) visit(voxel.asVec3d() + randomOffset(mix(key + std::uint64_t(i))));
+    for (int i = 0; i < options.perVoxel; ++i)
+        visit(voxel.asVec3d() + randomOffset(splitMix64(key + std::uint64_t(i))));
 }
 
 // Rounds to single precision. Not inlined: GCC 12 would leave out the rounding in values computed from it (x and y at

@@ -37,7 +37,7 @@ Particles particles(const openvdb::FloatGrid& liquid, const ParticleOptions& opt
 
 /// Creates particles inside a body, in the voxels of a solver's grid. If the field has its mesh, no particle is on the
 /// far side of a wall, however thin, even where the voxels are many times as wide. Otherwise this holds up to the
-/// resolution of the field's voxels. Also throws for a placement as check() does.
+/// resolution of the field's voxels. Also throws for a placement as seed() does.
 Particles particles(const Field& body, const Placement& placement, const openvdb::math::Transform& voxels,
                     const ParticleOptions& options = {});
 

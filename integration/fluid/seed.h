@@ -66,13 +66,19 @@ struct SeedReport {
 ///
 /// The result is a true level set: openvdb::tools::checkLevelSet finds no fault in it. (One exception: it may
 /// report a background "less than 3 voxel units" because the caller's background is smaller by its last bit, as that of
-/// createLevelSet(0.02, 3) is.) Distances from the mesh are exact (regrid.h). Where bodies meet, they are those of
+/// createLevelSet(0.02, 3) is.) Distances from the mesh are exact. Where bodies meet, they are those of
 /// OpenVDB's CSG. Next to creases, walls and gaps below a voxel, they are changed by fractions of a voxel if that check
 /// needs it; SeedReport states how far.
 ///
-/// Throws std::invalid_argument if the grid is no level set, its voxels are not cubes, or its band is narrower than 3
-/// voxels, and for everything that regrid() refuses. Throws std::runtime_error if no level set of this voxel size could
-/// be made, and Cancelled. The grid is then unchanged.
+/// Throws std::invalid_argument for
+/// - a grid that is no level set, whose voxels are not cubes or mirrored, or whose band is narrower than 3 voxels;
+/// - a placement with a number that is not finite, a rotation that is not of unit length, or a scale that is not
+/// positive;
+/// - a mesh with a hole wider than two voxels, or without an inside;
+/// - a body so thin that it would lie between the voxels at some position of them;
+/// - everything that build() refuses, such as a band of more memory than the machine has.
+/// Throws std::runtime_error if no level set of this voxel size could be made, and Cancelled. The grid is then
+/// unchanged.
 SeedReport seed(openvdb::FloatGrid& liquid, const Mesh& mesh, const Placement& placement = {},
                 const SeedOptions& options = {});
 

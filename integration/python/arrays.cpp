@@ -49,7 +49,7 @@ bool isWithin(double value, Range range) {
             return true;
         case Range::finite:
             return std::isfinite(value);
-        case Range::positiveOrInfinite:
+        case Range::nonNegativeOrInfinite:
             return value >= 0;
         case Range::nonNegative:
             return value >= 0 && std::isfinite(value);

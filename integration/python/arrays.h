@@ -29,8 +29,8 @@ std::string text(const Shape& shape);
 enum class Range {
     any,
     finite,
-    positiveOrInfinite,  ///< 0 or above, infinity included
-    nonNegative,         ///< 0 or above, finite
+    nonNegativeOrInfinite,  ///< 0 or above, infinity included
+    nonNegative,            ///< 0 or above, finite
 };
 
 /// How many items an argument has.
@@ -54,8 +54,9 @@ class Floats {
     const char* name() const { return name_; }
     /// The leading axes: (4, 5) for points in an array of shape (4, 5, 3).
     const Shape& shape() const { return shape_; }
-    /// "directions[3, 1]" of an item, and "; its leading shape is (4, 5)", both after broadcasting, for errors.
+    /// The name of an item for errors, as "directions[3, 1]", after broadcasting.
     std::string place(std::size_t item) const;
+    /// The shape after broadcasting for errors, as "; its leading shape is (4, 5)".
     std::string shapeText() const;
     /// Repeats the items as numpy's broadcasting does. Throws std::invalid_argument if they do not fit.
     void broadcast(const Shape& shape);
@@ -101,7 +102,8 @@ py::array readOnly(const Value* first, const Shape& shape, const py::handle& own
     return array;
 }
 
-/// An array that owns the items of a vector, without a copy.
+/// A capsule that owns the items of a vector, without a copy.
+/// @param first  receives the address of the first item
 template <class Item>
 py::capsule owned(std::vector<Item> items, Item*& first) {
     auto keeper = std::make_unique<std::vector<Item>>(std::move(items));

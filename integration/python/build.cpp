@@ -135,8 +135,8 @@ Request requestOf(const Options& given, const Mesh& mesh, const LevelSet* old = 
 
 // Runs a build that Ctrl-C cancels.
 LevelSet run(Request& request, const std::function<LevelSet(const BuildOptions&)>& job) {
-    return cancellable(request.progress, [&](const Listener& listener) {
-        request.options.progress = listener;
+    return cancellable(request.progress, [&](const ProgressCallback& progressCallback) {
+        request.options.progress = progressCallback;
         return job(request.options);
     });
 }

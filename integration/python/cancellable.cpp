@@ -117,16 +117,16 @@ bool report(const py::object& progress, float fraction) {
 
 }  // namespace
 
-void runCancellable(const py::object& progress, const std::function<void(const Listener&)>& job) {
+void runCancellable(const py::object& progress, const std::function<void(const ProgressCallback&)>& job) {
     std::atomic<float> fraction = 0;
     std::atomic<bool> cancelled = false;
     std::exception_ptr raised;
-    const Listener listener = [&](float done) {
+    const ProgressCallback progressCallback = [&](float done) {
         fraction = done;
         return !cancelled;
     };
     std::unique_ptr<Worker> worker = Workers::all().take();
-    std::future<void> running = worker->start([&] { job(listener); });
+    std::future<void> running = worker->start([&] { job(progressCallback); });
     const auto finished = [&] {
         const WithoutGil release;
         return running.wait_for(pollInterval) == std::future_status::ready;

@@ -14,19 +14,19 @@ namespace bilayer::python {
 namespace py = pybind11;
 
 /// As BuildOptions::progress.
-using Listener = std::function<bool(float)>;
+using ProgressCallback = std::function<bool(float)>;
 
 /// Runs a job on another thread and without the GIL. The calling thread, to which signals belong, looks for Ctrl-C
 /// and calls `progress` with the completed fraction. Call this with the GIL held.
 /// @param progress  a callable, which cancels by returning False, or None
 /// Throws what the job throws, what `progress` or a signal handler raises, and Cancelled; always after the job's end.
-void runCancellable(const py::object& progress, const std::function<void(const Listener&)>& job);
+void runCancellable(const py::object& progress, const std::function<void(const ProgressCallback&)>& job);
 
 /// The same for a job with a result.
 template <class Job>
 auto cancellable(const py::object& progress, Job job) {
-    std::optional<decltype(job(Listener()))> result;
-    runCancellable(progress, [&](const Listener& listener) { result.emplace(job(listener)); });
+    std::optional<decltype(job(ProgressCallback()))> result;
+    runCancellable(progress, [&](const ProgressCallback& progressCallback) { result.emplace(job(progressCallback)); });
     return std::move(*result);
 }
 

@@ -20,10 +20,11 @@
 namespace bilayer::python {
 namespace {
 
-constexpr std::array<std::pair<const char*, ContactAccuracy>, 3> accuracies{
-    {{"samples", ContactAccuracy::samples},
-     {"exact-near-features", ContactAccuracy::exactNearFeatures},
-     {"exact", ContactAccuracy::exact}}};
+std::pair<const char*, ContactAccuracy> named(ContactAccuracy accuracy) {
+    return {nameOf(accuracy), accuracy};
+}
+const std::array accuracies{named(ContactAccuracy::samples), named(ContactAccuracy::exactNearFeatures),
+                            named(ContactAccuracy::exact)};
 
 py::object toResult(const MassProperties& mass) {
     py::array_t<float> inertia({3, 3});

@@ -58,7 +58,7 @@ py::object findContacts(const py::object& a, const py::object& poseA, const py::
     const Records<Contact> records(std::move(contacts), {count});
     return result("Contacts", records.member(&Contact::position), records.member(&Contact::normal),
                   records.member(&Contact::distance), records.member(&Contact::feature).attr("view")("uint32"),
-                  records.member(&Contact::approach), records.member(&Contact::turningRadius), report.pointsTested,
+                  records.member(&Contact::approach), records.member(&Contact::roundingRadius), report.pointsTested,
                   report.beyondBand);
 }
 

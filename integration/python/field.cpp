@@ -40,7 +40,7 @@ void closestOf(const FieldObject& field, std::span<const glm::vec3> points, std:
 }
 
 py::object closest(const FieldObject& field, const py::object& object, const py::object& maxDistance) {
-    Floats points(object, "points", {3}), limits(maxDistance, "max_distance", {}, Range::positiveOrInfinite);
+    Floats points(object, "points", {3}), limits(maxDistance, "max_distance", {}, Range::nonNegativeOrInfinite);
     const bool one = limits.shape().empty();
     const Shape shape = one ? points.shape() : broadcast({&points, &limits});
     std::vector<ClosestPoint> answers(points.points().size());

@@ -90,8 +90,9 @@ py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::
     const SolidArgument solid(body, "body");
     const glm::dvec3 apart = solid.origin() - liquid.origin();
     openvdb::FloatGrid::Ptr grid;
-    const auto [maxChange, where, changedVoxels] = cancellable(py::none(), [&](const Listener& listener) {
-        options.progress = listener;
+    const auto [maxChange, where,
+                changedVoxels] = cancellable(py::none(), [&](const ProgressCallback& progressCallback) {
+        options.progress = progressCallback;
         grid = fluid::detail::liquidCopy(liquid);
         const Transform& voxels = liquid.grids().distance->transform();
         grid->setTransform(relativeTo(apart, voxels));
@@ -125,8 +126,8 @@ py::object makeParticles(const py::object& liquid, const py::object& pose, const
     } else {
         refuseType("liquid", "a LevelSet or a Field", liquid);
     }
-    fluid::Particles particles = cancellable(py::none(), [&](const Listener& listener) {
-        options.progress = listener;
+    fluid::Particles particles = cancellable(py::none(), [&](const ProgressCallback& progressCallback) {
+        options.progress = progressCallback;
         return make();
     });
     const auto count = py::ssize_t(particles.positions.size());
@@ -144,7 +145,7 @@ class Obstacle {
 
     const fluid::Solid& solid() const { return solid_; }
     openvdb::GridCPtrVec grids() const {
-        return {solid_.distance, solid_.velocity, solid_.openFaces, solid_.openVolume};
+        return {solid_.distance, solid_.velocity, solid_.faceFluidFraction, solid_.cellFluidFraction};
     }
     double voxelSize() const { return solid_.distance->voxelSize()[0]; }
     glm::dvec3 origin() const {
@@ -191,14 +192,14 @@ Obstacle makeObstacle(const py::object& solid, double voxelSize, const py::objec
     fluid::SolidOptions options{.velocity = {vector(velocity, "velocity"), vector(angularVelocity, "angular_velocity")},
                                 .halfWidthVoxels = halfWidth};
     const SolidArgument body(solid, "solid");
-    return cancellable(py::none(), [&](const Listener& listener) {
-        options.progress = listener;
+    return cancellable(py::none(), [&](const ProgressCallback& progressCallback) {
+        options.progress = progressCallback;
         openvdb::initialize();
         const Transform::Ptr cells = Transform::createLinearTransform(voxelSize);
         const fluid::Solid made = body.visit(
             [&](const auto& one) { return fluid::solid(one, placement, *relativeTo(body.origin(), *cells), options); });
         for (openvdb::GridBase* grid : std::initializer_list<openvdb::GridBase*>{
-                 made.distance.get(), made.velocity.get(), made.openFaces.get(), made.openVolume.get()})
+                 made.distance.get(), made.velocity.get(), made.faceFluidFraction.get(), made.cellFluidFraction.get()})
             grid->setTransform(cells->copy());
         return Obstacle(made);
     });
@@ -218,7 +219,8 @@ bool equal(const Obstacle& a, const Obstacle& b) {
     const WithoutGil release;
     const fluid::Solid &one = a.solid(), &other = b.solid();
     return same(*one.distance, *other.distance) && same(*one.velocity, *other.velocity) &&
-           same(*one.openFaces, *other.openFaces) && same(*one.openVolume, *other.openVolume);
+           same(*one.faceFluidFraction, *other.faceFluidFraction) &&
+           same(*one.cellFluidFraction, *other.cellFluidFraction);
 }
 
 // The obstacle of grids in the order of Obstacle::grids().
@@ -285,7 +287,7 @@ Raises ValueError for a body that is open or without an inside.
 
 >>> import bilayer
 >>> obstacle = bilayer.obstacle(bilayer.sphere(1), 0.1)
->>> float(obstacle.open_volume.min()), obstacle.velocity.shape[3]
+>>> float(obstacle.cell_fluid_fraction.min()), obstacle.velocity.shape[3]
 (0.0, 3)
 )";
 
@@ -309,7 +311,7 @@ void addFluid(py::module_& module) {
 
 >>> import bilayer
 >>> ball = bilayer.obstacle(bilayer.sphere(0.5), voxel_size=0.1)
->>> ball.distance.shape == ball.open_volume.shape
+>>> ball.distance.shape == ball.cell_fluid_fraction.shape
 True
 )");
     defineMethod(type, saveDoc, [](const Obstacle& self, const Path& path) { self.save(path); });
@@ -320,10 +322,10 @@ True
             "velocity", [](const Obstacle& self) { return self.dense(*self.solid().velocity); },
             "float32 (nx, ny, nz, 3): velocity across the lower faces of each cell.")
         .def_property_readonly(
-            "open_faces", [](const Obstacle& self) { return self.dense(*self.solid().openFaces); },
+            "face_fluid_fraction", [](const Obstacle& self) { return self.dense(*self.solid().faceFluidFraction); },
             "float32 (nx, ny, nz, 3): fluid fraction of the lower faces, 0 to 1.")
         .def_property_readonly(
-            "open_volume", [](const Obstacle& self) { return self.dense(*self.solid().openVolume); },
+            "cell_fluid_fraction", [](const Obstacle& self) { return self.dense(*self.solid().cellFluidFraction); },
             "float32 (nx, ny, nz): fluid fraction of each cell, 0 to 1.")
         .def_property_readonly(
             "origin", [](const Obstacle& self) { return toArray(self.origin()); },

@@ -105,7 +105,8 @@ py::object toReport(const MeshReport& r) {
 
 py::object inspectMesh(const SharedMesh& mesh, float wall) {
     requireNotNegative(double(wall), "wall");
-    return toReport(cancellable(py::none(), [&](const Listener& listener) { return inspect(*mesh, wall, listener); }));
+    return toReport(cancellable(
+        py::none(), [&](const ProgressCallback& progressCallback) { return inspect(*mesh, wall, progressCallback); }));
 }
 
 SharedMesh read(const Path& path) {
@@ -162,8 +163,8 @@ Reads a mesh: OBJ, PLY, STL, OFF, glTF and all other formats of Assimp, by the e
 merges vertices with equal coordinates. A mesh far from zero is moved to zero, and Mesh.origin says by how much: queries
 then take points - mesh.origin.
 
-Raises FileNotFoundError, RuntimeError that names the file and line if it cannot be read, and ValueError for coordinates
-that are not finite.
+Raises FileNotFoundError, and RuntimeError that names the file and line if it cannot be read, or a face has a coordinate
+that is not finite.
 
 >>> import bilayer, os, tempfile
 >>> with tempfile.TemporaryDirectory() as folder:

@@ -77,7 +77,7 @@ struct Rays {
     Rays(const py::object& from, const py::object& along, const py::object& reach)
         : origins(from, "origins", {3}),
           directions(along, "directions", {3}),
-          lengths(reach, "max_distance", {}, Range::positiveOrInfinite) {}
+          lengths(reach, "max_distance", {}, Range::nonNegativeOrInfinite) {}
 
     /// Some rays, after broadcasting. Throws std::invalid_argument for a direction of zero length.
     std::vector<Ray> make(std::size_t begin, std::size_t count) const;

@@ -95,7 +95,7 @@ ShapeObject makeTriangles(const SharedMesh& shared) {
         const WithoutGil release;
         validate(*shared);
     }
-    const TriangleSheet sheet{[shared](const Bounds& box, const TriangleSheet::Visitor& visitor) {
+    const OpenSurface openSurface{[shared](const Bounds& box, const OpenSurface::Visitor& visitor) {
         for (std::size_t i = 0; i < shared->triangles.size(); ++i) {
             Triangle triangle;
             Bounds own;
@@ -103,7 +103,7 @@ ShapeObject makeTriangles(const SharedMesh& shared) {
             if (detail::overlap(own, box)) visitor(triangle, i);
         }
     }};
-    return made(ContactShape::triangles(sheet), "triangles", shared);
+    return made(ContactShape::triangles(openSurface), "triangles", shared);
 }
 
 // As Python writes an argument; a long array by its shape.
@@ -192,7 +192,7 @@ Shape.hull([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
 constexpr const char* spheresDoc = R"(spheres(centres, radii) -> Shape
 
 The convex hull of spheres. centres: shape (N, 3). radii: shape (N,), or a number. Both are copied. The time to make it
-grows with the cube of N: it suits up to a few hundred spheres.
+grows with the fourth power of N at worst: it suits up to a few hundred spheres.
 
 Raises ValueError for other shapes, a negative radius, values that are not finite, and unless one radius is above 0.
 

@@ -32,10 +32,10 @@ struct TiledFieldObject : TiledField {
 };
 
 std::vector<Sample> samplesAt(const TiledFieldObject& field, std::span<const glm::vec3> points) {
-    return cancellable(py::none(), [&](const Listener& listener) {
+    return cancellable(py::none(), [&](const ProgressCallback& progressCallback) {
         std::vector<Sample> samples(points.size());
         for (std::size_t i = 0; i < points.size(); i += pointsPerBatch) {
-            if (!listener(float(i) / float(points.size()))) throw Cancelled();
+            if (!progressCallback(float(i) / float(points.size()))) throw Cancelled();
             const std::size_t count = std::min(pointsPerBatch, points.size() - i);
             field.sample(points.subspan(i, count), std::span(samples).subspan(i, count));
         }
@@ -58,7 +58,7 @@ py::object insideTiled(const TiledFieldObject& field, const py::object& object) 
 }
 
 py::object closestTiled(const TiledFieldObject& field, const py::object& object, const py::object& maxDistance) {
-    Floats points(object, "points", {3}), limits(maxDistance, "max_distance", {}, Range::positiveOrInfinite);
+    Floats points(object, "points", {3}), limits(maxDistance, "max_distance", {}, Range::nonNegativeOrInfinite);
     const Shape shape = broadcast({&points, &limits});
     std::vector<ClosestPoint> answers(points.points().size());
     answerInParts(answers.size(), 1, [&](std::size_t begin, std::size_t end) {

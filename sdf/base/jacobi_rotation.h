@@ -25,7 +25,7 @@ glm::mat<3, 3, Real> jacobiRotation(const glm::mat<3, 3, Real>& m, int p, int q)
 /// The eigenvectors of a symmetric matrix as columns, in no order, to about the precision of its numbers.
 template <class Real>
 glm::mat<3, 3, Real> eigenvectors(glm::mat<3, 3, Real> m) {
-    constexpr int passes = 6;  // each nearly squares the remainder beside the diagonal
+    constexpr int passes = 6;  // each nearly squares the remainder off the diagonal
     glm::mat<3, 3, Real> vectors(1);
     for (int pass = 0; pass < passes; ++pass)
         for (int p = 0; p < 3; ++p) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// OpenVDB's grids for the sources of this project: what OpenVDB's library holds compiled is not compiled again.
+// OpenVDB's grids for the sources of this project. Declares as extern what OpenVDB's library has compiled, so that it
+// is not compiled again.
 //
 // Every file that creates a grid would compile the virtual functions of its tree: reading, writing, counting, ten
 // seconds for each type of grid. The library has them for the types that openvdb::initialize() registers.

@@ -16,7 +16,7 @@ namespace bilayer::detail {
 /// Calls work(i) for each i below `count`, in parallel. Rethrows the exception with the lowest i, whichever was thrown
 /// first.
 template <class Work>
-void inOrder(std::size_t count, Work work) {
+void inParallel(std::size_t count, Work work) {
     if (count == 1) return work(std::size_t(0));
     std::atomic<std::size_t> failed = std::numeric_limits<std::size_t>::max();
     std::exception_ptr error;

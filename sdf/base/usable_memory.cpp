@@ -25,7 +25,7 @@ double limitOf(decltype(RLIMIT_AS) resource) {
     return double(limit.rlim_cur);
 }
 
-/// The number in a file; none if there is no such file, or "max" in it.
+/// The number in a file; infinite if there is no such file, or "max" in it.
 double numberIn(const std::filesystem::path& path) {
     std::ifstream file(path);
     double number = 0;

@@ -6,7 +6,7 @@
 namespace bilayer::detail {
 
 /// Returns the smallest of the physical memory, the process's limit of address space, and the limits of its control
-/// groups, as containers set them [bytes]. They are read at the first call.
+/// groups, as containers set them [bytes]. The limit of address space is read at each call, the others once.
 double usableMemory();
 
 /// Returns how much more memory this process may take by its own limits of address space and data (`ulimit -v`, `-d`)

@@ -23,7 +23,8 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace {
 
-/// Minimum speed along an axis; at it, a ray stays between two planes for a billion slacks, which is beyond all boxes.
+/// Minimum component of a direction along an axis. With it, a ray stays between two planes for a billion times their
+/// tolerance, which is beyond all boxes.
 constexpr float minSpeed = 1e-9f;
 /// Tolerance for the rounding of a quotient.
 constexpr float quotientRoundUp = 1 + 1e-6f;

@@ -47,10 +47,10 @@ class TriangleTree {
         if (boxes_.leafCount > 0) descend(boxes_.root(), meets, visit);
     }
 
-    /// Finds all intersections of a line with triangles, in no particular order. The line crosses an edge that two
-    /// triangles share only once, unless it hits the edge exactly. Such intersections are left out.
+    /// Finds all intersections of a line with triangles, in no particular order. Where the line crosses an edge that
+    /// two triangles share, it intersects one of them. If it may hit an edge exactly, the triangles there are left out,
+    /// and the answer is false.
     /// @param first  intersections beyond this line parameter; by default, of the line in both directions
-    /// Returns false if the line may hit an edge exactly.
     bool crossings(const glm::dvec3& origin, const glm::dvec3& direction, std::vector<Crossing>& found,
                    double first = -std::numeric_limits<double>::infinity()) const;
 

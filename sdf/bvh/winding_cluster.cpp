@@ -11,16 +11,16 @@
 namespace bilayer::detail {
 
 WindingCluster::WindingCluster(std::span<const Corners> triangles)
-    : radius(0), total(0), area(0), moment{}, moment2{}, spread(0) {
+    : radius(0), area(0), vectorArea(0), moment{}, moment2{}, spread(0) {
     glm::dvec3 weighted(0), plain(0);
     for (const Corners& t : triangles) {
         const glm::dvec3 a(t[0]), b(t[1]), c(t[2]), n = 0.5 * glm::cross(b - a, c - a), middle = (a + b + c) / 3.0;
-        total += glm::length(n);
-        area += n;
+        area += glm::length(n);
+        vectorArea += n;
         weighted += glm::length(n) * middle;
         plain += middle;
     }
-    centre = total > 0 ? weighted / total : plain / double(triangles.size());
+    centre = area > 0 ? weighted / area : plain / double(triangles.size());
     for (const Corners& t : triangles) {
         const glm::dvec3 a = glm::dvec3(t[0]) - centre, b = glm::dvec3(t[1]) - centre, c = glm::dvec3(t[2]) - centre;
         const glm::dvec3 n = 0.5 * glm::cross(b - a, c - a), s = (a + b + c) / 3.0;
@@ -36,19 +36,19 @@ WindingCluster::WindingCluster(std::span<const Corners> triangles)
 }
 
 WindingCluster::WindingCluster(const WindingCluster& left, const WindingCluster& right, const Bounds& box)
-    : total(left.total + right.total), area(left.area + right.area), moment{}, moment2{}, spread(0) {
-    centre = total > 0 ? (left.total * left.centre + right.total * right.centre) / total
-                       : 0.5 * (left.centre + right.centre);
+    : area(left.area + right.area), vectorArea(left.vectorArea + right.vectorArea), moment{}, moment2{}, spread(0) {
+    centre =
+        area > 0 ? (left.area * left.centre + right.area * right.centre) / area : 0.5 * (left.centre + right.centre);
     double reach = 0;
     for (const WindingCluster* child : {&left, &right}) {
         const glm::dvec3 s = child->centre - centre;
         reach = std::max(reach, glm::length(s) + child->radius);
-        spread += child->spread + child->total * glm::dot(s, s);
+        spread += child->spread + child->area * glm::dot(s, s);
         add(moment, child->moment);
-        add(moment, product(s, child->area));
+        add(moment, product(s, child->vectorArea));
         add(moment2, child->moment2);
         add(moment2, product(child->moment, s), 2);
-        add(moment2, product(product(s, s), child->area));
+        add(moment2, product(product(s, s), child->vectorArea));
     }
     const glm::dvec3 corner = glm::max(centre - glm::dvec3(box.lower), glm::dvec3(box.upper) - centre);
     radius = std::min(reach, glm::length(corner));
@@ -70,7 +70,7 @@ WindingEstimate WindingCluster::expansion(const glm::dvec3& point) const {
                          2 * (m[3] * u.x * u.y + m[4] * u.y * u.z + m[5] * u.z * u.x);
     const double first = (m[0] + m[1] + m[2] - 3 * along) / distance;
     const double second = (7.5 * cubic(moment2, u) - 4.5 * trace(moment2, u)) / squared;
-    return {unit * (glm::dot(area, u) + first + second), error};
+    return {unit * (glm::dot(vectorArea, u) + first + second), error};
 }
 
 }  // namespace bilayer::detail

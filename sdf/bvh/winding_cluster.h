@@ -17,8 +17,8 @@ struct WindingEstimate {
     double value, error;
 };
 
-/// The moments of triangles with the normals n, about a centre: integrals over all their points, which are s away from
-/// it.
+/// The moments of triangles about a centre: integrals over the triangles. There, s is the vector from the centre to a
+/// point, and n the unit normal.
 struct WindingCluster {
     using Corners = std::array<glm::vec3, 3>;
 
@@ -35,13 +35,13 @@ struct WindingCluster {
     /// exceeds `uselessError`.
     WindingEstimate expansion(const glm::dvec3& point) const;
 
-    glm::dvec3 centre;   ///< area-weighted
-    double radius;       ///< of a ball around `centre` that contains all triangles
-    double total;        ///< area
-    glm::dvec3 area;     ///< of n
-    Symmetric2 moment;   ///< of s n^T, symmetric part
-    Symmetric3 moment2;  ///< of s s^T (x) n, symmetric part
-    double spread;       ///< of |s|^2
+    glm::dvec3 centre;  ///< area-weighted
+    double radius;      ///< of a ball around `centre` that contains all triangles
+    double area;
+    glm::dvec3 vectorArea;  ///< of n
+    Symmetric2 moment;      ///< of s n^T, symmetric part
+    Symmetric3 moment2;     ///< of s s^T (x) n, symmetric part
+    double spread;          ///< of |s|^2
 };
 
 }  // namespace bilayer::detail

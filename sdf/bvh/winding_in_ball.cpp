@@ -66,20 +66,21 @@ void WindingInBall::addTriangles(const Node& leaf) {
 
 // A displacement d of the point is one of -d of all triangles: the moments of the cluster about its centre, less d, are
 // polynomials in d, and so is the expansion of WindingCluster. Its bound holds for |s - d| in place of |s|, whose
-// square integrates to at most (sqrt(spread) + radius sqrt(total))^2.
+// square integrates to at most (sqrt(spread) + radius sqrt(area))^2.
 void WindingInBall::addFar(const Node& node, const glm::dvec3& toCentre, double radius) {
     const double squared = glm::dot(toCentre, toCentre), distance = std::sqrt(squared);
     const double t = (node.radius + radius) / distance, unit = 1 / (4 * glm::pi<double>() * squared);
-    const double spread = std::sqrt(node.spread) + radius * std::sqrt(node.total);
+    const double spread = std::sqrt(node.spread) + radius * std::sqrt(node.area);
     far_.error += unit * spread * spread / squared * t * (4 - 3 * t) / ((1 - t) * (1 - t));
     far_.value += node.expansion(centre_).value;
     const glm::dvec3 u = toCentre / distance, mu = times(node.moment, u);
-    const double au = glm::dot(node.area, u), umu = glm::dot(u, mu);
+    const double au = glm::dot(node.vectorArea, u), umu = glm::dot(u, mu);
     const double sum = node.moment[0] + node.moment[1] + node.moment[2];
-    slope_ += unit / distance * (3 * au * u - node.area) + unit / squared * (6.0 * mu + 3 * sum * u - 15 * umu * u);
+    slope_ +=
+        unit / distance * (3 * au * u - node.vectorArea) + unit / squared * (6.0 * mu + 3 * sum * u - 15 * umu * u);
     const double scale = unit / squared;
     add(curvature_, product(u, u), 7.5 * au * scale);
-    add(curvature_, product(node.area, u), -3 * scale);
+    add(curvature_, product(node.vectorArea, u), -3 * scale);
     for (std::size_t axis = 0; axis < 3; ++axis) curvature_[axis] -= 1.5 * au * scale;
 }
 
@@ -93,8 +94,7 @@ WindingNumber::Estimate WindingInBall::farEstimate(const glm::dvec3& point) cons
 WindingNumber::Estimate WindingInBall::coarseEstimate(const glm::dvec3& point) const {
     const auto squaredTo = [&](const glm::dvec3& centre) { return glm::dot(centre - point, centre - point); };
     WindingNumber::Estimate sum = farEstimate(point);
-    for (const Node* cluster : clusters_)
-        sum.error += cluster->total / (glm::pi<double>() * squaredTo(cluster->centre));
+    for (const Node* cluster : clusters_) sum.error += cluster->area / (glm::pi<double>() * squaredTo(cluster->centre));
     for (const NearTriangle& triangle : triangles_) {
         const double squared = squaredTo(triangle.centre);
         sum.error += squared > 4 * triangle.squaredRadius ? 4 * triangle.area / squared : 0.5;

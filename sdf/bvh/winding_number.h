@@ -44,7 +44,7 @@ class WindingNumber {
     /// Returns whether any triangle intersects or touches the segment between two points [m].
     bool meets(const glm::dvec3& from, const glm::dvec3& to) const;
 
-    double area() const { return nodes_.front().total; }  ///< of all triangles [m^2]
+    double area() const { return nodes_.front().area; }  ///< of all triangles [m^2]
     std::size_t memoryBytes() const noexcept;
 
   private:

@@ -34,7 +34,7 @@ class BlockPiece {
           w_(along(piece.w.x)),
           n_(along(piece.n.x)) {}
 
-    // Reduces the distances in some slices of chunk c to those to the piece. Lattice coordinates are exact in floats,
+    // Lowers the distances in these slices of chunk c to those from the piece. Lattice coordinates are exact in floats,
     // so a voxel gets the same bytes in any block.
     inline void apply(int c, unsigned slices, BlockDistances& block) const {
         const ChunkTag tag;

@@ -186,6 +186,7 @@ class ExactBrickFiller {
 
     // Tries straight paths to voxels of known sign that are far from the surface, at most maxPaths.
     std::optional<bool> insideByPaths(const glm::ivec3& from, const BlockMask& outside, const BlockMask& inside) {
+        findCandidates();
         int tries = 0;
         for (std::size_t x = 0; x < inside.size(); ++x)
             for (std::uint64_t targets = found_.far[x] & (outside[x] | inside[x]); targets != 0;
@@ -199,14 +200,18 @@ class ExactBrickFiller {
         return std::nullopt;
     }
 
-    // Returns the winding number at the start of a straight path from the current point, given the number at its end.
-    // The path lies in the block, so every triangle that it crosses reaches the block.
-    std::optional<int> windingAtStart(const glm::ivec3& path, int atEnd) {
+    // The triangles that reach the block, each once: those that paths within it may cross.
+    void findCandidates() {
         candidates_.clear();
         forEachNear([](const glm::vec3&, float) { return true; },
                     [&](std::uint32_t triangle) { candidates_.push_back(triangle); });
         std::sort(candidates_.begin(), candidates_.end());
         candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
+    }
+
+    // Returns the winding number at the start of a straight path from the current point, given the number at its end.
+    // The path lies in the block.
+    std::optional<int> windingAtStart(const glm::ivec3& path, int atEnd) const {
         int winding = atEnd;
         for (const std::uint32_t triangle : candidates_) {
             const std::optional<int> crossing = segmentCrossing(side_.cornersOf(triangle), glm::dvec3(path));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The exact method on the CPU. In each block the samples of triangle pieces select the pieces that can be nearest to a
 // voxel. These pieces give the distance, and the closest feature gives the sign.
+// Tested by tests/sdf/exact.cpp through build().
 #pragma once
 
 #include "sdf/leaf/blocks.h"

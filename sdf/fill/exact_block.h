@@ -48,7 +48,8 @@ struct BlockInput {
 };
 
 /// The side of a voxel, encoded together with the index of its nearest piece.
-enum PieceSide : std::int32_t { sideUnknown = 0, sideOutside = 1, sideInside = 2, sideBits = 2 };
+enum PieceSide : std::int32_t { sideUnknown = 0, sideOutside = 1, sideInside = 2 };
+inline constexpr int sideBits = 2;  ///< of a PieceSide
 
 struct BlockDistances {
     alignas(64) float nearest2[blockVoxels];        ///< squared distance to the nearest piece [voxels^2]

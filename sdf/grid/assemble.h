@@ -50,7 +50,7 @@ class Assembler {
     /// Builds the level set of all blocks, with signs in the space between them. Call it once, after the last block.
     /// A part keeps blocks that have no voxel in the band, which the whole field needs for its signs. Throws Cancelled.
     openvdb::FloatGrid::Ptr distances();
-    /// The same with the values of space as they are stored, whose widths in voxels are not known exactly [m].
+    /// The same for grids read from files, with their background values outside and inside as they are stored [m].
     openvdb::FloatGrid::Ptr distances(float exterior, float interior);
 
     /// Builds the grid of nearest triangles of the active voxels; null unless requested. Call it once. Throws

@@ -96,7 +96,7 @@ FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const De
 }
 
 void FieldFiller::fillWithOwnSigns() {
-    Stopwatch part;
+    Stopwatch watch;
     const bool prism = options_.method == Method::prism;
     if (prism)
         signs_ = {prismSigns, "the side of the nearest triangle whose prism holds the voxel"};
@@ -106,25 +106,24 @@ void FieldFiller::fillWithOwnSigns() {
     if (prism) parameters.reach = reachOf(options_, Sign::normals);
     Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_, part_);
     std::atomic<std::size_t> undecided = 0;
-    MeshJob job{mesh_,
-                options_.voxelSize,
-                parameters.reach,
-                options_.triangles,
-                true,
-                [&](const FilledBlocks& blocks) { take(assembler, blocks); },
-                progress_,
-                {},
-                &undecided};
+    MeshJob job{.mesh = mesh_,
+                .voxelSize = options_.voxelSize,
+                .reach = parameters.reach,
+                .triangles = options_.triangles,
+                .sign = true,
+                .sink = [&](const FilledBlocks& blocks) { take(assembler, blocks); },
+                .progress = progress_,
+                .undecided = &undecided};
     restrict(job, part_);
     if (device_)
         device_->fill({job, options_, extent_.box, parameters});
     else
         fillDoubleLayer(job, extent_.box, options_.doubleLayer, parameters);
-    times_.fill += part.lap();
+    times_.fill += watch.lap();
     signs_.undecided = undecided;
     finish(assembler);
     trim();
-    times_.assemble += part.lap();
+    times_.assemble += watch.lap();
 }
 
 Sign FieldFiller::fill(const Mesh& mesh, Sign sign, const std::string& reason, Method method) {
@@ -136,30 +135,34 @@ Sign FieldFiller::fill(const Mesh& mesh, Sign sign, const std::string& reason, M
 // Fills the union of the mesh after orient(), as outwardMesh() documents. Returns false and fills nothing if no wall
 // lies inside the union.
 bool FieldFiller::fillUnion(const Mesh& mesh) {
-    Stopwatch part;
+    Stopwatch watch;
     UnionSurface united = unite(mesh, &progress_);
     if (!united.changed()) return false;
     const Orientation solids = orient(mesh, &progress_);
     if (solids.flippedTriangles > 0) united = unite(solids.mesh, &progress_);
-    times_.tiles += part.lap();
+    times_.prepare += watch.lap();
     fillFrom(united.mesh, solids.mesh, Sign::winding, unionReason(united), options_.method);
     return true;
 }
 
 void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, const std::string& reason, Method method,
                            const Adapt& adapt) {
-    Stopwatch part;
+    Stopwatch watch;
     const bool byNormals = sign == Sign::normals;
     const float reach = reachOf(options_, sign);
     const BandWidths widths = bandOf(options_);
     Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
                         plainBlocks(options_, sign), progress_, part_);
     std::atomic<std::size_t> undecided = 0, conflicts = 0;
-    MeshJob job{mesh,       options_.voxelSize,
-                reach,      options_.triangles,
-                byNormals,  [&](const FilledBlocks& blocks) { take(assembler, blocks); },
-                progress_,  {},
-                &undecided, &conflicts};
+    MeshJob job{.mesh = mesh,
+                .voxelSize = options_.voxelSize,
+                .reach = reach,
+                .triangles = options_.triangles,
+                .sign = byNormals,
+                .sink = [&](const FilledBlocks& blocks) { take(assembler, blocks); },
+                .progress = progress_,
+                .undecided = &undecided,
+                .conflicts = &conflicts};
     restrict(job, part_);
     if (adapt) adapt(job, assembler);
     // Flipping triangles does not change the bounding box.
@@ -169,7 +172,7 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
         fillExact(job, extent_.box);
     else
         fillPseudonormal(job);
-    times_.fill += part.lap();
+    times_.fill += watch.lap();
     finish(assembler);
     progress_.poll();
     if (sign == Sign::winding && part_)
@@ -186,7 +189,7 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     if (byNormals && !part_ && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean)
         repair(*distance_, mesh, options_, progress_, signs_);
     trim();
-    times_.assemble += part.lap();
+    times_.assemble += watch.lap();
 }
 
 // A second field of the mesh gives the signs: the one that was filled last.
@@ -206,7 +209,7 @@ void FieldFiller::fillWithSidesOfLast(const Mesh& mesh, const std::string& reaso
 // With equal widths on both sides, the active voxels do not depend on the signs. The sides of a closed mesh follow from
 // its triangles alone. A device that keeps the field leaves no block here.
 bool FieldFiller::signAgainByWinding(const Mesh& mesh, const std::string& reason) {
-    Stopwatch part;
+    Stopwatch watch;
     const BandWidths widths = bandOf(options_);
     const bool isComplete =
         filledBlocks_ > 0 && enclosesSurface(options_) && widths.exterior == widths.interior && !part_;
@@ -214,7 +217,7 @@ bool FieldFiller::signAgainByWinding(const Mesh& mesh, const std::string& reason
     makePositive(*distance_);
     signByWinding(*distance_, mesh, widths, true, &progress_);
     signs_ = {nameOf(Sign::winding), reason, 0, 0};
-    times_.assemble += part.lap();
+    times_.assemble += watch.lap();
     return true;
 }
 
@@ -238,14 +241,13 @@ void FieldFiller::trim() {
 }
 
 LevelSet FieldFiller::levelSet() {
-    if (distance_->empty() || distance_->activeVoxelCount() == 0)
-        throw std::invalid_argument("the half width is too small for this voxel size: no voxel lies within the band");
+    if (distance_->empty() || distance_->activeVoxelCount() == 0) throw std::invalid_argument(noVoxelInBand(options_));
     progress_.poll();
     return LevelSet(grids());
 }
 
 std::shared_ptr<Grids> FieldFiller::grids() {
-    Stopwatch part;
+    Stopwatch watch;
     describe(*distance_, mesh_.origin, part_ ? part_->meshHash : hash(mesh_), options_, signs_);
     auto grids = std::make_shared<Grids>();
     grids->distance = distance_;
@@ -255,7 +257,7 @@ std::shared_ptr<Grids> FieldFiller::grids() {
         grids->triangle = triangle_;
     }
     progress_.finish();
-    times_.assemble += part.lap();
+    times_.assemble += watch.lap();
     times_.total = total_.lap();
     times_.filledBlocks = filledBlocks_;
     grids->times = times_;

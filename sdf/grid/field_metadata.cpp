@@ -36,13 +36,19 @@ void describe(openvdb::FloatGrid& grid, const glm::dvec3& origin, std::uint64_t 
 void checkFieldOf(const LevelSet& field, const Mesh& mesh, const BuildOptions& options) {
     const auto refuse = [](const std::string& why) { throw std::invalid_argument("the level set " + why); };
     const BandWidths widths = bandOf(options);
-    if (field.voxelSize() != options.voxelSize) refuse(fmt::format("has voxels of {:g}", field.voxelSize()));
+    if (field.voxelSize() != options.voxelSize)
+        refuse(fmt::format("has voxels of {:g} m, and the options have {:g} m", field.voxelSize(), options.voxelSize));
     if (field.exteriorWidth() != widths.exterior * widths.voxelSize ||
         field.interiorWidth() != widths.interior * widths.voxelSize)
-        refuse(fmt::format("has a band {:g} wide outside, {:g} inside", field.exteriorWidth(), field.interiorWidth()));
-    if (field.method() != nameOf(options.method)) refuse(fmt::format("is of the method '{}'", field.method()));
+        refuse(fmt::format("has a band {:g} m wide outside and {:g} m inside, and the options have {:g} m and {:g} m",
+                           field.exteriorWidth(), field.interiorWidth(), widths.exterior * widths.voxelSize,
+                           widths.interior * widths.voxelSize));
+    if (field.method() != nameOf(options.method))
+        refuse(fmt::format("is of the method '{}', and the options have '{}'", field.method(), nameOf(options.method)));
     if (options.triangles && !field.grids().triangle) refuse("lacks the nearest triangles");
-    if (field.meshHash() != hash(mesh)) refuse("is of another mesh");
+    if (field.meshHash() != hash(mesh))
+        refuse(
+            fmt::format("is of another mesh: its hash is {:x}, that of this one {:x}", field.meshHash(), hash(mesh)));
     if (field.origin() != mesh.origin) refuse("has another origin than the mesh");
 }
 

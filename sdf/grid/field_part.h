@@ -35,7 +35,7 @@ struct PartSigns {
 
 /// How many signs of a part's leaves contradict winding numbers.
 struct ComparedSigns {
-    std::size_t leaves = 0;      ///< but for those without a voxel in the band and all on one side
+    std::size_t leaves = 0;      ///< except those without a voxel in the band and all on one side
     SignRepair everyFifth, all;  ///< in one column of five; in all columns
 };
 
@@ -45,7 +45,7 @@ struct FieldPart {
     std::uint64_t meshHash;  ///< of the whole mesh; 0: not known
     BlockBox lattice;        ///< contains all blocks of the whole field
     BlockBox own;            ///< the part's blocks
-    /// The numbers in the whole mesh of the part's triangles, which ascend.
+    /// The numbers in the whole mesh of the part's triangles, in ascending order.
     std::span<const std::uint32_t> triangles;
     PartSigns signs{};
 

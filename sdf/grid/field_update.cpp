@@ -32,7 +32,7 @@ bool canCopy(FieldFiller& filler, const LevelSet& old) {
 
 // Returns false if the signs then contradict each other.
 bool fillMoved(FieldFiller& filler, const LevelSet& old, const Mesh& oldMesh, std::span<const std::uint32_t> moved) {
-    Stopwatch part;
+    Stopwatch watch;
     const BuildOptions& options = filler.options();
     const Mesh& mesh = filler.mesh();
     const double voxelsPerUnit = 1.0 / double(options.voxelSize);
@@ -45,7 +45,7 @@ bool fillMoved(FieldFiller& filler, const LevelSet& old, const Mesh& oldMesh, st
         if (side != brickSideFor(bounds(oldMesh), voxelsPerUnit, reach)) return false;
     }
     const DirtyRegion dirty(oldMesh, mesh, moved, voxelsPerUnit, reach, side);
-    filler.times().tiles += part.lap();
+    filler.times().prepare += watch.lap();
     const std::string reason = options.sign == Sign::automatic ? closedAndOriented : asAskedFor;
     filler.fillFrom(mesh, mesh, Sign::normals, reason, options.method, [&](MeshJob& job, Assembler& assembler) {
         job.wanted = [&](const glm::ivec3& first, int cube) { return dirty.any(first, cube); };

@@ -43,22 +43,22 @@ std::optional<SignChoice> otherChoice(const FieldSigns& signs, const Mesh& mesh,
 // With normals, the pseudonormal method uses the signs of the exact method. The two methods round equal distances
 // differently, so their conflict counts would differ.
 void fillWithAutomaticSign(FieldFiller& filler) {
-    Stopwatch part;
+    Stopwatch watch;
     const Method method = filler.options().method;
     Progress& progress = filler.progress();
     SignChoice choice = chooseSign(filler.mesh(), &progress);
     if (choice.sign == Sign::normals && !choice.repaired && isKnownToIntersectItself(filler.options()))
         choice = chooseSignAfterConflict(filler.mesh(), &progress);
-    filler.times().tiles += part.lap();
+    filler.times().prepare += watch.lap();
     for (;;) {
         // Kept alive during the next selection, which may use it.
         const std::optional<Mesh> repaired = std::move(choice.repaired);
         const Mesh& mesh = repaired ? *repaired : filler.mesh();
         const bool borrows = choice.sign == Sign::normals && method == Method::pseudonormal;
         const Sign sign = filler.fill(mesh, choice.sign, choice.reason, borrows ? Method::exact : method);
-        part.lap();
+        watch.lap();
         auto other = sign == Sign::normals ? otherChoice(filler.signs(), mesh, progress) : std::nullopt;
-        filler.times().tiles += part.lap();
+        filler.times().prepare += watch.lap();
         if (!other) {
             if (borrows && sign == Sign::normals) filler.fillWithSidesOfLast(mesh, choice.reason);
             return;

@@ -6,12 +6,13 @@
 #include <algorithm>
 #include <cstring>
 
+#include "sdf/base/hash.h"
 #include "sdf/io/mapped_file.h"
 
 namespace bilayer::detail {
 namespace {
 
-constexpr std::uint64_t fnvStart = 0xcbf29ce484222325u, fnvPrime = 0x100000001b3u;
+constexpr std::uint64_t fnvStart = 0xcbf29ce484222325u;
 constexpr std::size_t partOfFile = 1 << 26;  // that is in memory at once [bytes]
 
 // Spreads the last words over all bits, so that a remainder of the hash is evenly distributed.
@@ -26,12 +27,6 @@ std::string hexDigits(std::uint64_t hash) {
 }
 
 }  // namespace
-
-// An FNV-1a step on 64 bits, with the high bits folded down.
-std::uint64_t mixedHash(std::uint64_t hash, std::uint64_t word) {
-    const std::uint64_t product = (hash ^ word) * fnvPrime;
-    return product ^ (product >> 32);
-}
 
 std::uint64_t contentHash(std::string_view bytes) {
     std::uint64_t hash = mixedHash(fnvStart, bytes.size());

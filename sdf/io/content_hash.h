@@ -13,9 +13,6 @@ namespace bilayer::detail {
 /// Returns a 64-bit hash of bytes. It is stable: records, shards and metadata of files depend on it.
 std::uint64_t contentHash(std::string_view bytes);
 
-/// Returns a hash that is continued by a word, for example by another hash.
-std::uint64_t mixedHash(std::uint64_t hash, std::uint64_t word);
-
 /// Returns a hash of a file's bytes as 16 hexadecimal digits. Only some of the bytes are in memory at once. Throws
 /// std::runtime_error that names the file.
 std::string fileHash(const std::filesystem::path& path);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bytes of a glTF file: its JSON and its buffers; internal.
+// Tested by tests/sdf/gltf_buffers.cpp through readScene().
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The JSON of a glTF file: the parts that define the shape, with members of validated types; internal.
+// Tested by tests/sdf/gltf_json.cpp through readScene().
 #pragma once
 
 #include <nlohmann/json.hpp>

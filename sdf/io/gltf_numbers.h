@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads numbers from the buffers of a glTF file. Each range is checked before it is read; internal.
+// Tested by tests/sdf/gltf_numbers.cpp through readGltf().
 #pragma once
 
 #include <fmt/format.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One reader for each natively supported format; internal. Each throws std::runtime_error that names the file, the line
 // or position, and the error. Files are read in parallel; the result does not depend on it.
+// Tested by tests/sdf/mesh_readers.cpp through readMesh().
 #pragma once
 
 #include <filesystem>

@@ -41,7 +41,7 @@ glm::dvec3 inWorld(const Mesh& mesh, std::size_t point) {
 template <class Write>
 std::vector<std::string> formatItems(std::size_t items, Write write) {
     std::vector<std::string> parts((items + partItems - 1) / partItems);
-    inOrder(parts.size(), [&](std::size_t part) {
+    inParallel(parts.size(), [&](std::size_t part) {
         for (std::size_t i = part * partItems; i < std::min((part + 1) * partItems, items); ++i) write(i, parts[part]);
     });
     return parts;

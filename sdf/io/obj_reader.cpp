@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Tested by tests/sdf/obj_reader.cpp through readMesh().
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -215,7 +216,7 @@ Polygons joined(const TextSource& source, std::vector<ObjPart>& parts) {
     Polygons all;
     const std::vector<std::size_t> begins = takePoints(all, parts);
     const std::size_t vertices = all.points.size();
-    inOrder(parts.size(), [&](std::size_t i) {
+    inParallel(parts.size(), [&](std::size_t i) {
         ObjPart& part = parts[i];
         std::vector<unsigned>& corners = part.faces.corners;
         for (const std::size_t corner : part.relativeCorners) corners[corner] += unsigned(begins[i]);
@@ -235,7 +236,7 @@ Mesh readObj(const std::filesystem::path& path, ReadReport& report) {
     MappedFile file(path);
     const TextSource source(path, file.bytes());
     std::vector<ObjPart> parts = cut(source);
-    inOrder(parts.size(), [&](std::size_t i) { PartReader(source, parts[i]).run(); });
+    inParallel(parts.size(), [&](std::size_t i) { PartReader(source, parts[i]).run(); });
     file.release();
     return assembled(file, joined(source, parts), path, report);
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Tested by tests/sdf/off_reader.cpp through readMesh().
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -187,11 +187,11 @@ bool Outline::isPinched(unsigned v, unsigned w) {
 // to the place where they part. Returns whether w leaves on the inner side of v there. The corners on the way note
 // their partners and the answer, so that edges both ways with many corners are followed once.
 bool Outline::leavesInside(unsigned v, unsigned w) {
-    way_.clear();
+    path_.clear();
     glm::dvec2 at = corners_[v].at;
     int side = 0;
-    while (corners_[v].partner != w && side == 0 && way_.size() < corners_.size()) {
-        way_.emplace_back(v, w);
+    while (corners_[v].partner != w && side == 0 && path_.size() < corners_.size()) {
+        path_.emplace_back(v, w);
         const glm::dvec2 from = at, &p = corners_[corners_[v].before].at, &q = corners_[corners_[w].after].at;
         at = isBetween(from, q, p) ? q : p;
         if (at == p) v = corners_[v].before;
@@ -199,7 +199,7 @@ bool Outline::leavesInside(unsigned v, unsigned w) {
         side = leavingSide(v, w, at, from);
     }
     const bool isInside = side > 0 || (side == 0 && corners_[v].partner == w && corners_[v].partnerIsInside);
-    for (const auto& [a, b] : way_) {
+    for (const auto& [a, b] : path_) {
         corners_[a].partner = b;
         corners_[b].partner = a;
         corners_[a].partnerIsInside = corners_[b].partnerIsInside = isInside;
@@ -207,8 +207,8 @@ bool Outline::leavesInside(unsigned v, unsigned w) {
     return isInside;
 }
 
-// The outline passes a place twice: towards it by v and away from it by w. On the line to `from`, both are one.
-// Returns 1 if the way by w then continues inside of that by v, -1 outside, and 0 if both are one further.
+// The outline passes a place twice: towards it by v and away from it by w. On the line to `from`, both paths coincide.
+// Returns 1 if the path by w then continues inside of that by v, -1 if outside, and 0 if they coincide further.
 int Outline::leavingSide(unsigned v, unsigned w, const glm::dvec2& at, const glm::dvec2& from) const {
     const Corner &corner = corners_[v], &other = corners_[w];
     const glm::dvec2 &end = corners_[corner.before].at, &out = corners_[other.after].at;

@@ -73,8 +73,8 @@ class Outline {
     int leavingSide(unsigned v, unsigned w, const glm::dvec2& at, const glm::dvec2& from) const;
 
     std::vector<Corner> corners_;
-    PointTree obstacles_;                             ///< corners that are not convex
-    std::vector<std::pair<unsigned, unsigned>> way_;  ///< pairs of corners that leavesInside() passed
+    PointTree obstacles_;                              ///< corners that are not convex
+    std::vector<std::pair<unsigned, unsigned>> path_;  ///< pairs of corners that leavesInside() passed
     unsigned left_ = 0;
     bool wasConvex_ = false;
 };

@@ -333,7 +333,7 @@ std::vector<Faces> readPlyElements(const PlyHeader& header, const PlyElement& el
                                    std::span<glm::vec<3, Scalar>> points) {
     const std::vector<const char*> begins = splitElement(header, element, data);
     std::vector<Faces> parts(begins.size());
-    inOrder(begins.size(), [&](std::size_t i) {
+    inParallel(begins.size(), [&](std::size_t i) {
         const std::size_t first = i * plyTaskElements;
         const BinaryValues part(header, element, {begins[i], data.end, data.swapped}, first);
         const std::size_t count = std::min(plyTaskElements, std::size_t(element.count) - first);

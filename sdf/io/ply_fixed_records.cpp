@@ -42,7 +42,7 @@ template <class Records, class Item>
 bool readAllRecords(const Records& records, PlyData& data, std::vector<Item>& items) {
     if (data.size() / records.size < items.size()) return false;
     std::atomic<bool> fits = true;
-    inOrder((items.size() + plyTaskElements - 1) / plyTaskElements, [&](std::size_t i) {
+    inParallel((items.size() + plyTaskElements - 1) / plyTaskElements, [&](std::size_t i) {
         const std::size_t first = i * plyTaskElements, count = std::min(plyTaskElements, items.size() - first);
         const std::span part(items.data() + first, count);
         if (fits && !records.read(data.at + first * records.size, data.swapped, part)) fits = false;
@@ -66,7 +66,7 @@ std::optional<PlyVertexRecords> PlyVertexRecords::of(const PlyElement& element) 
 
 std::optional<PlyTriangleRecords> PlyTriangleRecords::of(const PlyElement& element, std::uint64_t vertices) {
     const auto list = element.findCorners();
-    // provided that negative corners look like vertices that do not exist
+    // negative corners, read as unsigned numbers, must exceed the count of vertices
     const bool isCountSmall = vertices <= std::uint64_t(std::numeric_limits<std::int32_t>::max());
     if (!list || !isCountSmall || element.count == 0) return std::nullopt;
     const PlyProperty& corners = element.properties[*list];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Serialises polygons for transfer from one process to another; internal.
-// Tested by tests/sdf/child_process.cpp and tests/fuzz/scene_check.cpp.
+// Tested by tests/sdf/child_process.cpp.
 #pragma once
 
 #include <cstddef>

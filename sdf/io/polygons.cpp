@@ -35,7 +35,7 @@ using IndexRange = tbb::blocked_range<std::size_t>;
 
 /// Throws if a corner refers to a vertex that does not exist.
 void requireVertices(const std::vector<unsigned>& corners, std::size_t vertices) {
-    inOrder((corners.size() + itemsPerTask - 1) / itemsPerTask, [&](std::size_t part) {
+    inParallel((corners.size() + itemsPerTask - 1) / itemsPerTask, [&](std::size_t part) {
         const std::size_t end = std::min((part + 1) * itemsPerTask, corners.size());
         for (std::size_t i = part * itemsPerTask; i < end; ++i)
             if (corners[i] >= vertices)
@@ -128,7 +128,7 @@ class FaceTriangulator {
 
     std::vector<glm::uvec3> run(std::vector<std::string>& notes) const {
         std::vector<FaceTriangles> results(parts());
-        inOrder(parts(), [&](std::size_t i) { results[i] = triangulatePart(i); });
+        inParallel(parts(), [&](std::size_t i) { results[i] = triangulatePart(i); });
         std::vector<std::size_t> begins{0};
         FaceTriangles all;
         for (const FaceTriangles& result : results) {
@@ -143,7 +143,7 @@ class FaceTriangulator {
                 counted(all.uncovered, "face", "faces"), all.firstUncovered.index, all.firstUncovered.enclosedArea,
                 all.firstUncovered.triangleArea));
         all.triangles.resize(begins.back());
-        inOrder(results.size(), [&](std::size_t i) {
+        inParallel(results.size(), [&](std::size_t i) {
             std::copy(results[i].triangles.begin(), results[i].triangles.end(),
                       all.triangles.begin() + std::ptrdiff_t(begins[i]));
         });
@@ -218,7 +218,7 @@ std::size_t faceCount(const PolygonsOf<Scalar>& polygons) {
 void setTriangles(std::vector<glm::uvec3>& triangles, std::vector<Faces>& parts,
                   const std::vector<std::size_t>& begins) {
     resizeLarge(triangles, begins.back() / 3);
-    inOrder(parts.size(), [&](std::size_t i) {
+    inParallel(parts.size(), [&](std::size_t i) {
         const std::vector<unsigned>& corners = parts[i].corners;
         glm::uvec3* to = triangles.data() + begins[i] / 3;
         for (std::size_t k = 0; k < corners.size(); k += 3) *to++ = {corners[k], corners[k + 1], corners[k + 2]};
@@ -272,7 +272,7 @@ void setFaces(PolygonsOf<Scalar>& polygons, std::vector<Faces> parts) {
     } else {
         polygons.corners.resize(corners.back());
         polygons.sizes.resize(sizes.back());
-        inOrder(parts.size(), [&](std::size_t i) {
+        inParallel(parts.size(), [&](std::size_t i) {
             std::copy(parts[i].corners.begin(), parts[i].corners.end(),
                       polygons.corners.begin() + std::ptrdiff_t(corners[i]));
             std::copy(parts[i].sizes.begin(), parts[i].sizes.end(), polygons.sizes.begin() + std::ptrdiff_t(sizes[i]));
@@ -289,7 +289,7 @@ Mesh assembled(PolygonsOf<Scalar> polygons, const std::filesystem::path& path, R
     try {
         return meshOf(std::move(polygons), report);
     } catch (const std::invalid_argument& error) {
-        throw std::invalid_argument(fmt::format("{}: {}", path.string(), error.what()));
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
     } catch (const std::runtime_error& error) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
     }

@@ -72,7 +72,7 @@ std::vector<std::size_t> takePoints(Polygons& polygons, std::vector<Part>& parts
     std::vector<std::size_t> begins{0};
     for (const Part& part : parts) begins.push_back(begins.back() + part.points.size());
     polygons.points.resize(begins.back());
-    inOrder(parts.size(), [&](std::size_t i) {
+    inParallel(parts.size(), [&](std::size_t i) {
         std::copy(parts[i].points.begin(), parts[i].points.end(), polygons.points.begin() + std::ptrdiff_t(begins[i]));
         parts[i].points = {};
     });

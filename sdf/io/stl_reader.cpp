@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Tested by tests/sdf/stl_reader.cpp through checkBox().
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -59,7 +60,7 @@ PolygonsOf<float> readBinary(std::string_view bytes, const std::filesystem::path
     resizeLarge(polygons.points, std::size_t(3) * count);
     resizeLarge(polygons.triangles, count);
     constexpr std::size_t partFacets = 1 << 14;
-    inOrder((count + partFacets - 1) / partFacets, [&](std::size_t part) {
+    inParallel((count + partFacets - 1) / partFacets, [&](std::size_t part) {
         const char* facets = bytes.data() + stlBinarySize(0) + stlNormalBytes;
         for (std::size_t i = part * partFacets; i < std::min<std::size_t>((part + 1) * partFacets, count); ++i) {
             glm::vec3* corners = &polygons.points[3 * i];
@@ -162,11 +163,11 @@ Polygons readText(const TextSource& source) {
         parts.push_back({{{begin, end}}});
         begin = end;
     }
-    inOrder(parts.size(), [&](std::size_t i) { TextReader(source, parts[i]).run(); });
+    inParallel(parts.size(), [&](std::size_t i) { TextReader(source, parts[i]).run(); });
     if (!parts.back().endsSolid) source.fail(source.end(), "the file ends before its 'endsolid'");
     Polygons polygons;
     const std::vector<std::size_t> begins = takePoints(polygons, parts);
-    inOrder(parts.size(), [&](std::size_t i) {
+    inParallel(parts.size(), [&](std::size_t i) {
         for (unsigned& corner : parts[i].faces.corners) corner += unsigned(begins[i]);
     });
     for (const StlPart& part : parts)

@@ -51,7 +51,7 @@ auto readRecords(Cursor& text, std::size_t count, Read read) {
     std::vector<decltype(read(text, std::size_t(0), count))> parts(lines.size());
     std::atomic<bool> asLines = lines.size() > 1;
     if (asLines) {
-        inOrder(lines.size(), [&](std::size_t i) {
+        inParallel(lines.size(), [&](std::size_t i) {
             if (!asLines) return;
             Cursor at = lines[i].text;
             try {

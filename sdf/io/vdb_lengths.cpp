@@ -93,13 +93,14 @@ bool skipGrid(VdbStream& in) {
 void requireLengths(std::istream& stream, std::uint64_t size) {
     constexpr std::uint64_t identifier = 36;  // letters
     VdbStream in(stream, size);
-    if (in.read<std::int64_t>() != openvdb::OPENVDB_MAGIC) throw std::runtime_error("it does not begin as one");
+    if (in.read<std::int64_t>() != openvdb::OPENVDB_MAGIC)
+        throw std::runtime_error("its first bytes are not those of one");
     const auto version = in.read<std::uint32_t>();
     constexpr std::uint32_t first = openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION,
                             last = openvdb::OPENVDB_FILE_VERSION;
     if (version < first || version > last)
         throw std::runtime_error(fmt::format("it is of format {}; {} to {} are read", version, first, last));
-    in.skip(2 * sizeof(std::uint32_t) + 1 + identifier, "a head");
+    in.skip(2 * sizeof(std::uint32_t) + 1 + identifier, "a header");
     in.skipMetadata();
     const auto grids = in.read<std::uint32_t>();
     for (std::uint32_t i = 0; i < grids && skipGrid(in); ++i) continue;

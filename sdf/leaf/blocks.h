@@ -49,7 +49,9 @@ struct FillParameters {
     bool triangles;  ///< whether the nearest triangle is requested
 };
 
-/// A batch of filled blocks. Distances are signed, in voxels, by Eq. 3 of the paper; +infinity where unknown.
+/// A batch of filled blocks. Distances are in voxels. The double layer method signs them by Eq. 3 of the paper, and
+/// stores +infinity where they are unknown. The exact methods sign them by the mesh, and store +-farAway beyond the
+/// reach. Those of a flood have no sign yet.
 struct FilledBlocks {
     std::span<const glm::ivec3> origins;      ///< index coordinates of each block's first voxel
     std::span<const float> distances;         ///< blockVoxels per block
@@ -87,7 +89,7 @@ struct MeshJob {
 
 /// The input of a device.
 struct FillJob {
-    const MeshJob& mesh;
+    const MeshJob& input;
     const BuildOptions& options;
     const Bounds& box;      ///< of the mesh
     FillParameters layers;  ///< of the double layer method

@@ -84,6 +84,14 @@ BandWidths bandOf(const BuildOptions& options) {
     return {options.exteriorWidthVoxels, options.interiorWidthVoxels, options.voxelSize};
 }
 
+std::string noVoxelInBand(const BuildOptions& options) {
+    return fmt::format(
+        "the half width is too small for this voxel size: no voxel of {:g} m lies within the band, {:g} voxels outside "
+        "and "
+        "{:g} inside",
+        options.voxelSize, options.exteriorWidthVoxels, options.interiorWidthVoxels);
+}
+
 bool enclosesSurface(const BuildOptions& options) {
     return std::min(options.exteriorWidthVoxels, options.interiorWidthVoxels) > 1 + reachSlack;
 }

@@ -3,6 +3,8 @@
 // Tested by tests/sdf/build.cpp through build().
 #pragma once
 
+#include <string>
+
 #include <bilayer/sdf/options.h>
 #include "sdf/leaf/band.h"
 #include "sdf/leaf/blocks.h"
@@ -23,6 +25,9 @@ void checkOptions(const BuildOptions& options);
 bool hasOwnSigns(Method method);
 
 BandWidths bandOf(const BuildOptions& options);
+
+/// Returns the error text for a field without a voxel in its band.
+std::string noVoxelInBand(const BuildOptions& options);
 
 /// Returns whether two neighbouring voxels on opposite sides of the surface are both in the band. This holds for a band
 /// wider than one voxel.

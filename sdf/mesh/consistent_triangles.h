@@ -28,7 +28,7 @@ class ConsistentTriangles {
     /// as flipped.
     std::vector<std::uint64_t> edgeSums();
 
-    /// Triangles at edges where a one-sided surface joins its own reverse.
+    /// Triangles at edges where no flipping makes neighbours agree, as on a Moebius strip.
     const std::vector<unsigned>& contradictions() const { return contradictions_; }
 
     /// Duplicate triangles would hide that an edge has only two triangles. Except in balanced bodies, they do not count

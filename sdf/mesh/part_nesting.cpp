@@ -55,11 +55,11 @@ PartNesting::PartNesting(const Mesh& mesh, const TriangleTree& tree, std::span<c
         if (c.innermost != noPart) isInnermost[c.innermost] = true;
     for (const unsigned part : order_) {
         poll(progress);
-        if (isInnermost[part]) heritage_[part].passesOn = findTouching(part, heritage_[part].touching);
+        if (isInnermost[part]) heritage_[part].isInherited = findTouching(part, heritage_[part].touching);
     }
     forAll([&](unsigned part) {
         Containers& c = containers_[part];
-        if (!found[part] || (c.innermost != noPart && !heritage_[c.innermost].passesOn))
+        if (!found[part] || (c.innermost != noPart && !heritage_[c.innermost].isInherited))
             findAll(part, tree, c);
         else if (c.innermost != noPart)
             correct(part, c);
@@ -116,7 +116,7 @@ unsigned PartNesting::clearContainer(unsigned part, std::vector<unsigned>& touch
     for (; outer != noPart && touching.size() <= maxTests; outer = containers_[outer].innermost) {
         if (parts_.touch(part, outer))
             touching.push_back(outer);
-        else if (heritage_[outer].passesOn)
+        else if (heritage_[outer].isInherited)
             break;
     }
     return outer;

@@ -55,10 +55,10 @@ class PartNesting {
         unsigned innermost = noPart;
         std::vector<unsigned> added, removed, own;
     };
-    /// State that a part passes on to the parts it contains.
+    /// What the parts within a part inherit from it.
     struct Heritage {
-        bool passesOn = false;
-        std::vector<unsigned> touching;  // larger parts that touch it: others know them not from it
+        bool isInherited = false;        // whether they inherit its containers
+        std::vector<unsigned> touching;  // larger parts that touch it: parts within it must test these themselves
     };
 
     bool findInnermost(unsigned part, Containers& containers) const;

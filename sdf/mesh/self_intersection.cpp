@@ -24,11 +24,11 @@ enum class PlaneCut { none, edge, through };
 
 // Finds intersecting triangles by the signs of volumes of their corners: P. Guigue, O. Devillers, "Fast and robust
 // triangle-triangle overlap test using orientation predicates", Journal of Graphics Tools 8 (2003) 25-42.
-class Pairs {
+class PairTest {
   public:
-    Pairs(const Mesh& mesh, const Topology& topology) : mesh_(mesh), topology_(topology) {}
+    PairTest(const Mesh& mesh, const Topology& topology) : mesh_(mesh), topology_(topology) {}
 
-    bool pierce(unsigned first, unsigned second) const {
+    bool intersects(unsigned first, unsigned second) const {
         const glm::uvec3 &a = mesh_.triangles[first], &b = mesh_.triangles[second];
         if (shared(a, b) > 1) return false;
         const glm::ivec3 aSides = sides(b, a);
@@ -89,7 +89,8 @@ class Pairs {
         for (auto use = std::lower_bound(edges.begin(), edges.end(), std::pair(low, high), before);
              use != edges.end() && use->low == low && use->high == high; ++use) {
             const glm::uvec3& other = mesh_.triangles[use->triangle];
-            if (side(plane, other.x ^ other.y ^ other.z ^ low ^ high) == -sides[off]) return true;
+            const unsigned third = other.x ^ other.y ^ other.z ^ low ^ high;  // the corner that is not on the edge
+            if (side(plane, third) == -sides[off]) return true;
         }
         return false;
     }
@@ -108,7 +109,7 @@ class Pairs {
 
 std::size_t countIntersectingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree,
                                    Progress* progress) {
-    const Pairs pairs(welded, topology);
+    const PairTest pairs(welded, topology);
     return tbb::parallel_reduce(
         tbb::blocked_range<std::uint32_t>(0, tree.boxes().leafCount, 64), std::size_t(0),
         [&](const auto& range, std::size_t count) {
@@ -116,7 +117,7 @@ std::size_t countIntersectingPairs(const Mesh& welded, const Topology& topology,
             std::vector<std::pair<unsigned, unsigned>> close;
             for (std::uint32_t leaf = range.begin(); leaf < range.end(); ++leaf) {
                 findClosePairs(welded, tree, leaf, close);
-                for (const auto& [a, b] : close) count += pairs.pierce(std::min(a, b), std::max(a, b));
+                for (const auto& [a, b] : close) count += pairs.intersects(std::min(a, b), std::max(a, b));
             }
             return count;
         },

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "sdf/base/equal_points.h"
+#include "sdf/base/hash.h"
 #include "sdf/base/polled_loop.h"
 
 namespace bilayer::detail {
@@ -17,13 +18,6 @@ namespace {
 
 /// Vertices, triangles or half-edges per task.
 constexpr std::size_t edgesPerTask = 4096;
-
-// Mixes every bit of a word into all others: the finalizer of S. Vigna's and G. Steele's SplitMix64.
-std::uint64_t mixedBits(std::uint64_t word) {
-    word = (word ^ (word >> 30)) * 0xbf58476d1ce4e5b9u;
-    word = (word ^ (word >> 27)) * 0x94d049bb133111ebu;
-    return word ^ (word >> 31);
-}
 
 // Returns the bits of a coordinate; adding zero turns -0 into 0.
 std::uint64_t bitsOf(float coordinate) {

@@ -24,7 +24,8 @@ struct FilledMesh {
 ///
 /// These loops stay open: loops inside the solid, loops of open surfaces, and loops with more than 1000 edges. All
 /// cracks are closed. Edges across a crack are split at each other's vertices, so that no triangle without area
-/// remains. Vertices with equal coordinates count as one. A mesh in which no loop is filled keeps its bytes.
+/// remains. Vertices with equal coordinates count as one. A mesh stays as it is if no loop is filled and
+/// no vertices of boundaries are joined.
 /// Deterministic; O(n^3) in the edge count of a loop.
 /// @param mesh   valid and oriented (see orient())
 /// @param crack  loops with a mean width up to this are cracks [m]

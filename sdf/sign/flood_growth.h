@@ -26,7 +26,7 @@ struct FloodArrival {
     bool inside;
 };
 
-/// A leaf of unsigned distances, and the sides of its voxels as far as a flood knows them.
+/// A leaf of unsigned distances, and the sides of its voxels as far as a flood has found them.
 struct FloodLeaf {
     /// Entries of `around` for blocks that are no leaves.
     static constexpr std::uint32_t outsideSpace = std::numeric_limits<std::uint32_t>::max(),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a flood in one tile tells the tiles around it: the outermost voxels of the tile, the regions of free space that
-// they belong to, and the steps in which the flood reaches the others.
+// What a flood in one tile passes to the tiles around it: the outermost voxels of the tile, the regions of free space
+// that they belong to, and the steps in which the flood reaches the others.
+//
 // Tested by tests/sdf/tile_flood_signs.cpp.
 #pragma once
 
@@ -79,7 +80,7 @@ struct BorderArrivals {
 };
 
 void writeArrivals(const std::filesystem::path& path, const BorderArrivals& arrivals);
-/// Returns the round of a file alone.
+/// Returns the round that a file states, without a check of its hash; 0 if there is no such file.
 std::uint32_t readRound(const std::filesystem::path& path);
 /// Throws std::runtime_error that names a file that is damaged.
 BorderArrivals readArrivals(const std::filesystem::path& path);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The regions of a tile where the ball of a flood fits: sets of voxels that are connected within the tile. They are
-// joined across the borders of all tiles, which tells which of them are outside.
+// joined across the borders of all tiles, which shows which of them are outside.
 // Tested by tests/sdf/tile_flood_signs.cpp.
 #pragma once
 

@@ -35,7 +35,8 @@ VoxelSides sidesWithin(const openvdb::FloatTree& tree, const BlockBox& box) {
     for (auto tile = tree.cbeginValueOff(); tile; ++tile)
         if (*tile < 0) inside += double(tile.getVoxelCount());
     const glm::dvec3 size(box.end - box.first);
-    return {inside<size.x * size.y * size.z, inside> 0};
+    const bool hasOutside = inside<size.x * size.y * size.z, hasInside = inside> 0;
+    return {hasOutside, hasInside};
 }
 
 }  // namespace
@@ -84,8 +85,9 @@ void FloodTile::add(const FloodNeighbour& neighbour) {
         } else if (const BorderLeaf* leaf = neighbour.border.leafAt(first)) {
             addLeaf(neighbour, *leaf, number);
         } else {
-            throw std::runtime_error(fmt::format(
-                "a tile's border lacks the block at {}, {}, {}: remove the folder work", first.x, first.y, first.z));
+            throw std::runtime_error(
+                fmt::format("a tile's border lacks the block at {}, {}, {}: remove the folder `work` of the tiles",
+                            first.x, first.y, first.z));
         }
     }
     addArrivals(neighbour.byDistance, byDistance_);
@@ -158,7 +160,7 @@ std::vector<BorderArrival> FloodTile::arrivals() const {
     return all;
 }
 
-// The leaves and the space of the tile, and those of the next layer above it as far as its neighbours tell them.
+// The leaves and the space of the tile, and those of the next layer above it as far as its neighbours state them.
 openvdb::FloatTree::Ptr FloodTile::signedTree() {
     const BandWidths widths = bandOf(options_);
     const float exterior = widths.exterior * widths.voxelSize, interior = widths.interior * widths.voxelSize;

@@ -28,7 +28,7 @@
 
 namespace bilayer::detail {
 
-/// What a tile knows of a neighbour.
+/// What a tile has read of a neighbour.
 struct FloodNeighbour {
     FloodBorder border;
     RegionSides sides;

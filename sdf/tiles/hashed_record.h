@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Binary files with a hash of their bytes, for what tiles tell each other. The numbers are in the processor's order.
+// Binary files with a hash of their bytes, for what tiles of a field exchange. The numbers are in the processor's
+// order.
+//
 // Tested by tests/sdf/tile_flood_signs.cpp.
 #pragma once
 
@@ -72,8 +74,10 @@ class HashedRecordReader {
 
     std::size_t size() const { return bytes_.size(); }  ///< [bytes]
 
-  private:
+    /// Throws std::runtime_error that names the file as damaged: values do not fit together.
     [[noreturn]] void fail() const;
+
+  private:
     void take(void* to, std::size_t bytes) {
         if (bytes > bytes_.size() - at_) fail();
         if (bytes > 0) std::memcpy(to, bytes_.data() + at_, bytes);

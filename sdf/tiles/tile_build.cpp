@@ -25,7 +25,7 @@ constexpr double tileBytesPerTriangle = 240;
 constexpr double bytesPerColumn = 12;
 /// Memory per block: a leaf, its place in the tree, its compressed form, and the bytes of the file [bytes].
 constexpr double tileBytesPerBlock = 5000;
-/// The same for a flood: what it knows of a leaf and of its parts, and the copies of leaves on borders [bytes].
+/// The same for a flood: what it keeps of a leaf and of its parts, and the copies of leaves on borders [bytes].
 constexpr double floodBytesPerBlock = 2000;
 /// Memory of a flood per block of the tile's box, leaf or not: its set and its leaf [bytes].
 constexpr double floodBytesPerBoxBlock = 9;

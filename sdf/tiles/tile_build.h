@@ -30,7 +30,7 @@ struct MeshFacts {
     std::uint64_t triangles = 0;
 };
 
-/// What a tile tells of its signs by normals, if it checks them.
+/// What a tile reports of its signs by normals, if it checks them.
 struct SignCounts {
     std::size_t conflicts = 0;  ///< places where normals contradict each other
     ComparedSigns compared{};

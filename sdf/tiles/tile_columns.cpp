@@ -88,8 +88,10 @@ void writeColumnSums(const std::filesystem::path& path, const ColumnSums& sums) 
 ColumnSums readColumnSums(const std::filesystem::path& path) {
     HashedRecordReader record(path);
     const auto first = record.value<glm::ivec2>(), end = record.value<glm::ivec2>();
-    ColumnSums sums(first, end);
     const auto values = record.values<std::int32_t>();
+    const glm::dvec2 size = glm::dvec2(end) - glm::dvec2(first);
+    if (!(size.x >= 0 && size.y >= 0 && size.x * size.y == double(values.size()))) record.fail();
+    ColumnSums sums(first, end);
     std::copy(values.begin(), values.end(), sums.values().begin());
     return sums;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the manifest of a field in tiles tells of them.
+// What the manifest of a field in tiles states of them.
 // Tested by tests/tools/tiled_field.cpp through TiledField.
 #pragma once
 

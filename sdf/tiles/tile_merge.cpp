@@ -82,8 +82,8 @@ LevelSet TileMerger::merged() {
     const openvdb::FloatGrid::Ptr distance = assembler_->distances(first_->background(), interior);
     distance->setTransform(first_->transform().copy());
     if (isFlooded(*first_)) assemble(*distance, inside_, first_->background(), interior, &progress_);
-    const bool bySigns = entryOf<std::string>(*first_, metadata::sign) == nameOf(Sign::normals);
-    if (const std::size_t conflicts = bySigns ? assembler_->conflicts(*distance) : 0)
+    const bool byNormals = entryOf<std::string>(*first_, metadata::sign) == nameOf(Sign::normals);
+    if (const std::size_t conflicts = byNormals ? assembler_->conflicts(*distance) : 0)
         throw std::invalid_argument(fmt::format("the signs of tiles contradict each other at {} places", conflicts));
     distance->insertMeta(*first_);
     distance->insertMeta(metadata::signUndecided, openvdb::Int64Metadata(undecided_));

@@ -62,14 +62,15 @@ PartSigns signsOf(const SignChoice& choice, const Mesh& mesh) {
 
 }  // namespace
 
-SignedSource decideSigns(Mesh mesh, const BuildOptions& options, int round, const std::function<void()>& orient) {
+SignedSource decideSigns(Mesh mesh, const BuildOptions& options, int round,
+                         const std::function<void()>& beforeOrienting) {
     if (!isAutomatic(options)) {
         auto source = trianglesOf(std::move(mesh));
         const PartSigns signs = requested(options, *source);
         return {std::move(source), signs};
     }
     if (round == 0 && balanced(mesh)) return {trianglesOf(std::move(mesh)), byNormals(closedAndOriented)};
-    orient();
+    beforeOrienting();
     const std::uint64_t known = hash(mesh);
     SignChoice choice = choiceInRound(mesh, round);
     if (choice.repaired) mesh = std::move(*choice.repaired);

@@ -21,12 +21,13 @@ struct SignedSource {
 };
 
 /// Returns the signs that build() chooses for a mesh.
-/// @param round   how often normals have contradicted each other, for Sign::automatic
-/// @param orient  called before what needs several times the memory of the mesh; may throw
+/// @param round            how often normals have contradicted each other, for Sign::automatic
+/// @param beforeOrienting  called before what needs several times the memory of the mesh; may throw
 /// Throws std::invalid_argument that names what tiles cannot do: signs of open meshes by winding numbers.
-SignedSource decideSigns(Mesh mesh, const BuildOptions& options, int round, const std::function<void()>& orient);
+SignedSource decideSigns(Mesh mesh, const BuildOptions& options, int round,
+                         const std::function<void()>& beforeOrienting);
 
-/// The same for a mesh that is not read whole. Throws if only orienting the mesh could tell the signs.
+/// The same for a mesh that is not read whole. Throws if the signs cannot be found without orienting the mesh.
 SignedSource decideSigns(std::unique_ptr<TriangleSource> source, const BuildOptions& options, int round);
 
 /// Returns the options of the tiles with these signs: a flood needs distances farther from the surface than others.

@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
+#include "sdf/base/hash.h"
 #include "sdf/fill/triangle_limits.h"
-#include "sdf/io/content_hash.h"
 #include "sdf/io/input_file.h"
 #include "sdf/tiles/hashed_record.h"
 

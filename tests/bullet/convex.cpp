@@ -176,6 +176,31 @@ TEST_CASE("Straight paths enter convex shapes where the distance is zero, and on
     CHECK(entries > 1500);
 }
 
+TEST_CASE("The side of a cone has generator lines however flat it is, and its flat end has none") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const float half : {0.5f, 0.05f, 0.01f}) {
+        CAPTURE(half);
+        btConeShape shape(0.6f, 2 * half);
+        shape.setMargin(0);
+        const Convex cone = convexOf(shape);
+        for (int i = 0; i < 100; ++i) {
+            const float angle = float(random(0, 6.2831)), part = float(random(0.1, 0.9));
+            const glm::vec3 out(std::cos(angle), 0, std::sin(angle)),
+                normal = glm::normalize(2 * half * out + glm::vec3(0, 0.6f, 0)),
+                place = 0.6f * part * out + glm::vec3(0, half - 2 * half * part, 0) + 0.01f * normal;
+            const auto line = cone.sideLine(cone.nearest(place, 1), place);
+            REQUIRE(line);
+            // from the rim to the apex, through the nearest point
+            CHECK(glm::distance((*line)[0], 0.6f * out - glm::vec3(0, half, 0)) < 1e-5f);
+            CHECK(glm::distance((*line)[1], glm::vec3(0, half, 0)) < 1e-5f);
+            const glm::vec3 below = 0.6f * part * out - glm::vec3(0, half + 0.01f, 0);
+            CHECK_FALSE(cone.sideLine(cone.nearest(below, 1), below));
+        }
+    }
+}
+
 TEST_CASE("Nothing is inside of a flat hull, and paths next to it do not enter it") {
     const unsigned seed = test::seed();
     CAPTURE(seed);

@@ -90,7 +90,7 @@ double distanceBetween(const Triangle& a, const Triangle& b, double best) {
 }
 
 // Whether an edge of A intersects B.
-bool pierces(const Triangle& a, const Triangle& b) {
+bool crosses(const Triangle& a, const Triangle& b) {
     const auto& q = b.corners;
     const glm::dvec3 normal = glm::cross(q[1] - q[0], q[2] - q[0]);
     for (int i = 0; i < 3; ++i) {
@@ -112,7 +112,7 @@ std::optional<double> distanceBetween(const std::vector<Triangle>& a, const std:
         for (const Triangle& other : b) {
             best = distanceBetween(one, other, best);
             const bool meet = glm::distance(one.middle, other.middle) < one.radius + other.radius;
-            if (meet && (pierces(one, other) || pierces(other, one))) return std::nullopt;
+            if (meet && (crosses(one, other) || crosses(other, one))) return std::nullopt;
         }
     return best;
 }

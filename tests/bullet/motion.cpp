@@ -28,7 +28,7 @@ namespace {
 constexpr float h = 0.05f;  // voxel [m]
 
 /// The transforms of a pile of bodies of several kinds after some steps, on a count of threads.
-std::vector<float> heap(int threads) {
+std::vector<float> pile(int threads) {
     static const auto torus = exactTorus(0.4f, 0.15f, h), box = exactBox({0.3f, 0.2f, 0.15f}, h),
                       bowl = exactBowl(2.f, 0.2f, 0.1f);
     tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
@@ -61,10 +61,10 @@ std::vector<float> heap(int threads) {
 }  // namespace
 
 TEST_CASE("Three hundred steps give the same bits on 1, 2 and 8 threads") {
-    const std::vector<float> one = heap(1);
+    const std::vector<float> one = pile(1);
     for (float value : one) REQUIRE(std::isfinite(value));
     for (int threads : {2, 8}) {
-        const std::vector<float> more = heap(threads);
+        const std::vector<float> more = pile(threads);
         REQUIRE(more.size() == one.size());
         CHECK(std::memcmp(more.data(), one.data(), one.size() * sizeof(float)) == 0);
     }

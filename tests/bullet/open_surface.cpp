@@ -61,7 +61,8 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
         pose.position.z = halfSlab.z - lowest + 0.5f * h * part(random);
         const auto collide = [&](const TriangleShape& slab) {
             std::vector<Contact> contacts;
-            collideTriangles(bullet::detail::sheetOf(*slab.shape), {}, {}, {*body, pose}, {.margin = h}, contacts);
+            collideTriangles(bullet::detail::openSurfaceOf(*slab.shape), {}, {}, {*body, pose}, {.margin = h},
+                             contacts);
             return contacts;
         };
         const auto few = collide(two), others = collide(many);
@@ -111,7 +112,7 @@ TEST_CASE("A corner has the same depth below triangles as below their plane, in 
                               (pose.rotation * (half * glm::vec3(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1))).z);
         pose.position.z = -lowest - depth;
         std::vector<Contact> contacts;
-        collideTriangles(bullet::detail::sheetOf(ground), {}, {}, {*box, pose}, {.margin = h}, contacts);
+        collideTriangles(bullet::detail::openSurfaceOf(ground), {}, {}, {*box, pose}, {.margin = h}, contacts);
         float deepest = h;
         glm::vec3 direction(0);
         for (const Contact& contact : contacts)
@@ -140,7 +141,7 @@ TEST_CASE("A vertex below a crease of triangles has the depths of both faces") {
         const glm::vec3 axis = glm::normalize(glm::vec3(0.3f * any(random), 0.3f * any(random), -1));
         const glm::quat rotation = glm::angleAxis(std::acos(axis.z), glm::normalize(glm::vec3(-axis.y, axis.x, 0)));
         std::vector<Contact> contacts;
-        collideTriangles(bullet::detail::sheetOf(*groove.shape), {}, {},
+        collideTriangles(bullet::detail::openSurfaceOf(*groove.shape), {}, {},
                          {*cone, {tip - 0.5f * height * axis, rotation}}, {.margin = h}, contacts);
         for (const glm::vec3& up : {left, right}) {
             float deepest = h;

@@ -192,8 +192,8 @@ TEST_CASE("A field comes to rest on uneven ground, where each contact has a feat
     CHECK_FALSE(body->isActive());
 
     std::vector<Contact> contacts;
-    collideTriangles(bullet::detail::sheetOf(waves.shape(asTerrain)), {}, {}, shape.placed(body->getWorldTransform()),
-                     {.margin = h}, contacts);
+    collideTriangles(bullet::detail::openSurfaceOf(waves.shape(asTerrain)), {}, {},
+                     shape.placed(body->getWorldTransform()), {.margin = h}, contacts);
     std::set<std::uint32_t> features;
     for (const Contact& contact : contacts) features.insert(contact.feature);
     CHECK(features.size() == contacts.size());

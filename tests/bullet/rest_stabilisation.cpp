@@ -35,13 +35,13 @@ void useFriction(World& world) {
 }
 
 /// Rings that rest in a bowl, across each other.
-struct Heap {
+struct Pile {
     Shape bowl{exactBowl(1, 0.1f, 2 * h)};
     Shape ring{exactTorus(0.2f, 0.07f, h), {.restingFriction = 1.5f}};
     World world;
     std::vector<btRigidBody*> rings;
 
-    explicit Heap(unsigned seed) {
+    explicit Pile(unsigned seed) {
         useFriction(world);
         world.dynamics.getSolverInfo().m_frictionERP = 0.5f;
         world.add(bowl, 0, {0, 0, 0});
@@ -96,20 +96,20 @@ struct BoxOnIce {
 TEST_CASE("A pile that cannot sleep does not drift, and falls when its bowl is removed") {
     const unsigned start = seed();
     CAPTURE(start);
-    Heap heap(start);
-    const WorldExtensions still(heap.world.dynamics, resting);
-    heap.settle();
-    CHECK(heap.farthest(4) < 0.02f * h);
-    CHECK(still.restingBodies() + 2 >= int(heap.rings.size()));
+    Pile pile(start);
+    const WorldExtensions still(pile.world.dynamics, resting);
+    pile.settle();
+    CHECK(pile.farthest(4) < 0.02f * h);
+    CHECK(still.restingBodies() + 2 >= int(pile.rings.size()));
 
-    const float before = heap.rings.front()->getCenterOfMassPosition().z();
-    for (int i = 0; i < heap.world.dynamics.getNumCollisionObjects(); ++i) {
-        btCollisionObject* object = heap.world.dynamics.getCollisionObjectArray()[i];
+    const float before = pile.rings.front()->getCenterOfMassPosition().z();
+    for (int i = 0; i < pile.world.dynamics.getNumCollisionObjects(); ++i) {
+        btCollisionObject* object = pile.world.dynamics.getCollisionObjectArray()[i];
         if (object->isStaticObject()) object->setWorldTransform(btTransform(btQuaternion(0, 0, 0, 1), {0, 0, -100}));
     }
-    heap.world.dynamics.updateAabbs();
-    heap.world.run(0.5f);
-    CHECK(before - heap.rings.front()->getCenterOfMassPosition().z() == Approx(0.5f * 9.81f * 0.25f).epsilon(0.05));
+    pile.world.dynamics.updateAabbs();
+    pile.world.run(0.5f);
+    CHECK(before - pile.rings.front()->getCenterOfMassPosition().z() == Approx(0.5f * 9.81f * 0.25f).epsilon(0.05));
     CHECK(still.restingBodies() == 0);
 }
 
@@ -117,27 +117,27 @@ TEST_CASE("A body that wakes up is where it fell asleep") {
     const unsigned start = seed();
     const bool byIsland = GENERATE(false, true);  // Bullet then wakes the others, in the middle of a step
     CAPTURE(start, byIsland);
-    Heap heap(start);
-    const WorldExtensions still(heap.world.dynamics, resting);
-    heap.settle();
+    Pile pile(start);
+    const WorldExtensions still(pile.world.dynamics, resting);
+    pile.settle();
     std::vector<btVector3> asleep;
-    for (btRigidBody* ring : heap.rings) {
+    for (btRigidBody* ring : pile.rings) {
         ring->forceActivationState(ISLAND_SLEEPING);
         asleep.push_back(ring->getCenterOfMassPosition());
     }
-    heap.world.run(0.5f);
+    pile.world.run(0.5f);
     if (byIsland) {
-        heap.rings[0]->forceActivationState(DISABLE_DEACTIVATION);
-        heap.world.run(1 / 240.f);
-        REQUIRE(std::count_if(heap.rings.begin(), heap.rings.end(), [](auto* ring) { return ring->isActive(); }) > 1);
+        pile.rings[0]->forceActivationState(DISABLE_DEACTIVATION);
+        pile.world.run(1 / 240.f);
+        REQUIRE(std::count_if(pile.rings.begin(), pile.rings.end(), [](auto* ring) { return ring->isActive(); }) > 1);
     }
-    for (btRigidBody* ring : heap.rings) ring->forceActivationState(DISABLE_DEACTIVATION);
+    for (btRigidBody* ring : pile.rings) ring->forceActivationState(DISABLE_DEACTIVATION);
     // bodies that Bullet woke have no weight for a step, and some of them get a speed that is gone some steps later
-    heap.world.run(10 / 240.f);
-    CHECK(still.restingBodies() + 2 >= int(heap.rings.size()));
-    CHECK(heap.farthest(2) < 0.02f * h);
-    for (std::size_t i = 0; i < heap.rings.size(); ++i)
-        CHECK(asleep[i].distance(heap.rings[i]->getCenterOfMassPosition()) < 0.02f * h);
+    pile.world.run(10 / 240.f);
+    CHECK(still.restingBodies() + 2 >= int(pile.rings.size()));
+    CHECK(pile.farthest(2) < 0.02f * h);
+    for (std::size_t i = 0; i < pile.rings.size(); ++i)
+        CHECK(asleep[i].distance(pile.rings[i]->getCenterOfMassPosition()) < 0.02f * h);
 }
 
 TEST_CASE("Rest stabilisation does not stop thrown, weightless, hanging or moved bodies") {

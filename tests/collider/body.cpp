@@ -238,6 +238,15 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     REQUIRE(bodyOf(withBody(stored(), body)).accuracy == ContactAccuracy::samples);
 }
 
+TEST_CASE("the words of version 0.1 for a contact accuracy are read") {
+    for (const auto& [word, accuracy] : {std::pair{"edges", ContactAccuracy::exactNearFeatures},
+                                         {"triangles", ContactAccuracy::exact},
+                                         {"exact-near-features", ContactAccuracy::exactNearFeatures},
+                                         {"exact", ContactAccuracy::exact},
+                                         {"samples", ContactAccuracy::samples}})
+        REQUIRE(bodyOf(changed(setting("bilayer:measure", std::string(word)))).accuracy == accuracy);
+}
+
 TEST_CASE("a field alone is no body") {
     const LevelSet plain = levelSetOf(sphereSolid(0.4), 0.05);
     REQUIRE_FALSE(hasBody(plain));

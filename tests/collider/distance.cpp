@@ -189,6 +189,29 @@ TEST_CASE("A limit ends the search for bodies that are farther apart") {
     CHECK(distance(a, far).distance == Approx(3e9));
 }
 
+TEST_CASE("A limit of zero finds bodies that overlap or touch") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Collider torus = colliderOf(shapes::torus(0.5f, 0.15f)), box = colliderOf(shapes::box(glm::vec3(0.5f)));
+    int overlaps = 0;
+    for (int i = 0; i < 200; ++i) {
+        CAPTURE(i);
+        const Placed a{torus, randomPose(random, 0.7)}, b{box, randomPose(random, 0.7), 0.8f};
+        const BodyDistance unlimited = distance(a, b), limited = distance(a, b, {.maxDistance = 0});
+        CHECK(limited.found == (unlimited.overlap != Overlap::none));
+        CHECK(limited.overlap == unlimited.overlap);
+        if (limited.found) CHECK(limited.distance == unlimited.distance);
+        overlaps += limited.found;
+    }
+    CHECK(overlaps > 50);
+    CHECK(overlaps < 150);
+    const Placed a{box}, touching{box, {{1, 0, 0}}};
+    CHECK(distance(a, touching, {.maxDistance = 0}).found);
+    CHECK(distance(a, Placed{box, {{1.5f, 0, 0}}}, {.maxDistance = 0.5f}).found);
+    CHECK_FALSE(distance(a, Placed{box, {{1.0001f, 0, 0}}}, {.maxDistance = 0}).found);
+}
+
 TEST_CASE("A body inside another is distinguished from one that is apart") {
     const Collider ball = colliderOf(shapes::sphere(0.2f, 3)), large = colliderOf(shapes::sphere(1, 4)),
                    shell = colliderOf(shapes::join({shapes::sphere(1, 4), shapes::flipped(shapes::sphere(0.8f, 4))})),

@@ -363,7 +363,7 @@ TEST_CASE("a body collides with triangles anywhere, of any numbers") {
         const auto corner = [&] { return i % 3 ? extreme.vector() : glm::vec3(extreme(-1, 1), 0.1f, extreme(-1, 1)); };
         std::vector<Triangle> triangles{{corner(), corner(), corner()}, {corner(), corner(), corner()}};
         triangles.push_back({triangles[0][0], triangles[0][1], extreme.vector()});
-        const TriangleSheet sheet{[&](const Bounds&, const TriangleSheet::Visitor& visitor) {
+        const OpenSurface sheet{[&](const Bounds&, const OpenSurface::Visitor& visitor) {
             for (std::size_t t = 0; t < triangles.size(); ++t) visitor(triangles[t], t);
         }};
         PlacedShape body{ContactShape(ball())}, ground{ContactShape::triangles(sheet)};

@@ -69,7 +69,7 @@ TEST_CASE(
         std::size_t held = 0, left = 0;
         for (const glm::vec3& place : placesNear(mesh, field, random, 2000)) {
             CAPTURE(place.x, place.y, place.z);
-            if (!errorMask.hold(place)) {
+            if (!errorMask.isMarked(place)) {
                 REQUIRE(offAt(place) < 0.2);
                 ++left;
                 continue;
@@ -98,12 +98,12 @@ TEST_CASE("the interpolation-error mask does not depend on who asks first, nor o
     const auto answersOf = [&](const InterpolationErrorMask& errorMask) {
         std::vector<char> answers(places.size());
         tbb::parallel_for(std::size_t(0), places.size(),
-                          [&](std::size_t i) { answers[i] = errorMask.hold(places[i]); });
+                          [&](std::size_t i) { answers[i] = errorMask.isMarked(places[i]); });
         return answers;
     };
     const InterpolationErrorMask first(field), second(field);
     const std::vector<char> answers = answersOf(first);
-    for (std::size_t i = places.size(); i-- > 0;) REQUIRE(second.hold(places[i]) == bool(answers[i]));
+    for (std::size_t i = places.size(); i-- > 0;) REQUIRE(second.isMarked(places[i]) == bool(answers[i]));
     REQUIRE(answersOf(first) == answers);
     const InterpolationErrorMask copy = first;
     REQUIRE(answersOf(copy) == answers);
@@ -113,14 +113,14 @@ TEST_CASE("the interpolation-error mask does not depend on who asks first, nor o
 TEST_CASE("edges are in the interpolation-error mask, faces and gentle bends are not; without a field nothing is") {
     const Field box = fieldOf(solids[0]);
     const InterpolationErrorMask ofBox(box);
-    CHECK(ofBox.hold({0.0999f, 0.0699f, 0}));
-    CHECK_FALSE(ofBox.hold({0.1f, 0, 0}));
-    CHECK_FALSE(ofBox.hold({0, 0, 0.05f}));
-    CHECK_FALSE(ofBox.hold({0, 0, 0}));
+    CHECK(ofBox.isMarked({0.0999f, 0.0699f, 0}));
+    CHECK_FALSE(ofBox.isMarked({0.1f, 0, 0}));
+    CHECK_FALSE(ofBox.isMarked({0, 0, 0.05f}));
+    CHECK_FALSE(ofBox.isMarked({0, 0, 0}));
     const float huge = 1e30f, none = std::numeric_limits<float>::quiet_NaN();
     for (const glm::vec3& place : {glm::vec3(100, 0, 0), glm::vec3(-huge, 0, 0), glm::vec3(0, huge, none)})
-        CHECK_FALSE(ofBox.hold(place));
-    CHECK_FALSE(InterpolationErrorMask().hold({0.0999f, 0.0699f, 0}));
+        CHECK_FALSE(ofBox.isMarked(place));
+    CHECK_FALSE(InterpolationErrorMask().isMarked({0.0999f, 0.0699f, 0}));
 
     const Mesh ring = shapes::torus(0.3f, 0.1f);
     const Collider smooth(ring, build(ring, {.voxelSize = voxel}));

@@ -201,8 +201,11 @@ TEST_CASE("Shapes that overlap a collider are distinguished from those inside it
         CAPTURE(subject.name);
         const Pose pose = randomPoseAt(random, 2);
         const PlacedShape b{field, pose};
+        // a limit of zero finds each of them
+        const auto overlapWithin = [&](const PlacedShape& a) { return distance(a, b, {.maxDistance = 0}).overlap; };
         // inside
         const BodyDistance inside = distance({subject.shape, pose, 0.2f}, b);
+        CHECK(overlapWithin({subject.shape, pose, 0.2f}) == Overlap::aInsideB);
         CHECK(inside.overlap == Overlap::aInsideB);
         CHECK(inside.distance < -0.1f);
         CHECK(distance(b, {subject.shape, pose, 0.2f}).overlap == Overlap::bInsideA);
@@ -210,6 +213,7 @@ TEST_CASE("Shapes that overlap a collider are distinguished from those inside it
         const BodyDistance around = distance({subject.shape, pose, 40}, b);
         CHECK(around.overlap == Overlap::bInsideA);
         CHECK(around.distance < 0);
+        CHECK(overlapWithin({subject.shape, pose, 40}) == Overlap::bInsideA);
         // on a face, by a hundredth
         const glm::vec3 up = pose.rotation * glm::vec3(0, 0, 1);
         float lowest = std::numeric_limits<float>::infinity();
@@ -220,6 +224,7 @@ TEST_CASE("Shapes that overlap a collider are distinguished from those inside it
         const glm::vec3 place = pose.toWorld({0.03f, 0.02f, 3 - lowest - 0.01f});
         const BodyDistance deep = distance({subject.shape, {place, pose.rotation * rotation}, 0.4f}, b);
         CHECK(deep.overlap == Overlap::surfaces);
+        CHECK(overlapWithin({subject.shape, {place, pose.rotation * rotation}, 0.4f}) == Overlap::surfaces);
         CHECK(deep.distance == Approx(-0.01f).margin(0.0008));
         CHECK(glm::dot(deep.normal, up) > 0.95f);
         // their poses count, not their motions
@@ -236,7 +241,7 @@ TEST_CASE("Planes and sheets of triangles have the distance of the lowest vertex
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    const TriangleSheet quad{[](const Bounds& box, const TriangleSheet::Visitor& visitor) {
+    const OpenSurface quad{[](const Bounds& box, const OpenSurface::Visitor& visitor) {
         if (box.lower.z > 0 || box.upper.z < 0) return;
         visitor({glm::vec3(-50, -50, 0), {50, -50, 0}, {50, 50, 0}}, 0);
         visitor({glm::vec3(-50, -50, 0), {50, 50, 0}, {-50, 50, 0}}, 1);
@@ -261,6 +266,8 @@ TEST_CASE("Planes and sheets of triangles have the distance of the lowest vertex
         CHECK(plane.overlap == (lowest > 0 ? Overlap::none : highest < 0 ? Overlap::bInsideA : Overlap::surfaces));
         CHECK(glm::distance(plane.normal, glm::vec3(-up)) < 1e-5f);
         CHECK(plane.b.feature == Feature::vertex);
+        if (std::abs(lowest) > 1e-4)
+            CHECK(distance({ContactShape::plane({0, 0, 1}, 0), world}, b, {.maxDistance = 0}).overlap == plane.overlap);
         const BodyDistance sheet = distance({ContactShape::triangles(quad), world}, b);
         REQUIRE(sheet.found);
         if (lowest > 1e-4) {
@@ -270,6 +277,7 @@ TEST_CASE("Planes and sheets of triangles have the distance of the lowest vertex
         } else if (lowest < -1e-4 && highest > 1e-4) {
             CHECK(sheet.overlap == Overlap::surfaces);
             CHECK(sheet.distance <= 0);
+            CHECK(distance({ContactShape::triangles(quad), world}, b, {.maxDistance = 0}).distance == sheet.distance);
         }
     }
 }

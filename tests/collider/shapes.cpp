@@ -40,8 +40,8 @@ const ContactShape& block() {
 }
 
 /// Waves of triangles over the xy plane, as a height field of cells.
-TriangleSheet flatSheet() {
-    return {[](const Bounds& box, const TriangleSheet::Visitor& visitor) {
+OpenSurface flatSheet() {
+    return {[](const Bounds& box, const OpenSurface::Visitor& visitor) {
         constexpr float cell = 0.23f;
         constexpr int count = 8;
         for (int x = -count; x < count; ++x)

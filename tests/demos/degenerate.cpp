@@ -11,7 +11,7 @@
 #include "tests/support/support.h"
 
 namespace bilayer::degenerate_test {
-using demo::Thing;
+using demo::BodyPrototype;
 
 namespace {
 
@@ -53,25 +53,25 @@ std::vector<Mesh> degenerates() {
     return {spike, wedge, crack, shapes::box({half, half, half})};
 }
 
-std::shared_ptr<const Thing> thingOf(const Mesh& mesh, ContactAccuracy measure) {
-    return demo::makeThing(mesh, {.voxelSize = voxel, .accuracy = measure});
+std::shared_ptr<const BodyPrototype> prototypeOf(const Mesh& mesh, ContactAccuracy accuracy) {
+    return demo::makePrototype(mesh, {.voxelSize = voxel, .accuracy = accuracy});
 }
 
 }  // namespace
 
 TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest, not deep in each other") {
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = test::seed();
-    CAPTURE(nameOf(measure), start);
+    CAPTURE(nameOf(accuracy), start);
     std::mt19937 random(start);
     std::uniform_real_distribution<float> any(-1, 1);
     demo::Stage stage("degenerate bodies");
-    const auto floor = thingOf(shapes::box({lane / 2 - 0.2f, lane / 2 - 0.2f, half}), measure);
-    std::vector<std::shared_ptr<const Thing>> upright, over;
+    const auto floor = prototypeOf(shapes::box({lane / 2 - 0.2f, lane / 2 - 0.2f, half}), accuracy);
+    std::vector<std::shared_ptr<const BodyPrototype>> upright, over;
     for (const Mesh& mesh : degenerates()) {
-        upright.push_back(thingOf(mesh, measure));
-        over.push_back(thingOf(turnedOver(mesh), measure));
+        upright.push_back(prototypeOf(mesh, accuracy));
+        over.push_back(prototypeOf(turnedOver(mesh), accuracy));
     }
     // exactly above each other; offset by half over the edge; and slightly off either
     const float asides[] = {0, half};

@@ -52,7 +52,7 @@ TEST_CASE("energy rises by the most that it climbs above what it once was") {
 }
 
 TEST_CASE("a stage reports what a falling body does, and how deep bodies overlap") {
-    const auto ball = demo::makeThing(shapes::sphere(0.1f, 4), {0.01f});
+    const auto ball = demo::makePrototype(shapes::sphere(0.1f, 4), {0.01f});
     const auto play = [&](float offset) {
         demo::Stage stage("fall", {.stepsPerSecond = 100, .stepsPerFrame = 10});
         stage.add(ball, {.mass = 2, .linearDamping = 0, .angularDamping = 0}, {{0, 0, 5}}, {});
@@ -98,7 +98,7 @@ TEST_CASE("the linking number of circles is that of Gauss") {
 
 TEST_CASE("an outcome is written as a recording, a table of energies and fields") {
     demo::Stage stage("a ball");
-    const auto ball = demo::makeThing(shapes::sphere(0.1f, 3), {0.02f});
+    const auto ball = demo::makePrototype(shapes::sphere(0.1f, 3), {0.02f});
     stage.add(ball, {.mass = 1}, {}, {});
     stage.run(0.1);
     demo::Outcome outcome = stage.finish({});

@@ -42,7 +42,7 @@ double sixVolumes(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
 }
 
 // Includes touching: a segment without a vertex of the triangle must not meet the triangle at all.
-bool pierces(const glm::dvec3& p, const glm::dvec3& q, const Corners& t) {
+bool crosses(const glm::dvec3& p, const glm::dvec3& q, const Corners& t) {
     const double below = sixVolumes(p, t[0], t[1], t[2]), above = sixVolumes(q, t[0], t[1], t[2]);
     if (below * above > 0 || (below == 0 && above == 0)) return false;
     const double u = sixVolumes(p, q, t[0], t[1]), v = sixVolumes(p, q, t[1], t[2]), w = sixVolumes(p, q, t[2], t[0]);
@@ -67,7 +67,7 @@ int piercings(const Mesh& mesh) {
             if (apart(triangle, other)) continue;
             const auto uses = [&](unsigned v) { return v == t.x || v == t.y || v == t.z; };
             for (int k = 0; k < 3; ++k)
-                if (!uses(s[k]) && !uses(s[(k + 1) % 3])) count += pierces(other[k], other[(k + 1) % 3], triangle);
+                if (!uses(s[k]) && !uses(s[(k + 1) % 3])) count += crosses(other[k], other[(k + 1) % 3], triangle);
         }
     return count;
 }
@@ -89,7 +89,7 @@ TEST_CASE("a carved box is closed, oriented and about as many triangles as asked
     CHECK_THROWS_AS(shapes::carvedBox(99), std::invalid_argument);
 }
 
-TEST_CASE("a carved box does not pierce itself") {
+TEST_CASE("a carved box does not intersect itself") {
     for (const std::size_t triangles : {std::size_t(100), std::size_t(3000), std::size_t(10000)})
         CHECK(piercings(shapes::carvedBox(triangles)) == 0);
     // the count itself finds two boxes that intersect

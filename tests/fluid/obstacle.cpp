@@ -27,8 +27,9 @@ struct Sums {
 
 Sums sumsOf(const fluid::Solid& solid) {
     Sums sums;
-    for (auto v = solid.openVolume->cbeginValueOn(); v; ++v) sums.cells += (1 - double(*v)) * double(v.getVoxelCount());
-    for (auto v = solid.openFaces->cbeginValueOn(); v; ++v)
+    for (auto v = solid.cellFluidFraction->cbeginValueOn(); v; ++v)
+        sums.cells += (1 - double(*v)) * double(v.getVoxelCount());
+    for (auto v = solid.faceFluidFraction->cbeginValueOn(); v; ++v)
         sums.faces += (openvdb::Vec3d(1) - openvdb::Vec3d(*v)) * double(v.getVoxelCount());
     return sums;
 }
@@ -40,8 +41,8 @@ TEST_CASE("what planes cut off is exact") {
     const float h = 0.1f;
     const auto cells = Transform::createLinearTransform(h);
     const fluid::Solid solid = fluid::solid(shapes::box({0.23f, 0.16f, 0.31f}), {}, *cells);
-    const auto volume = solid.openVolume->getConstAccessor();
-    const auto faces = solid.openFaces->getConstAccessor();
+    const auto volume = solid.cellFluidFraction->getConstAccessor();
+    const auto faces = solid.faceFluidFraction->getConstAccessor();
     CHECK(volume.getValue(Coord(0)) == 0);
     CHECK(volume.getValue(Coord(2, 0, 0)) == Approx(0.2f).margin(1e-4));  // the cell: 1.5 to 2.5, solid up to 2.3
     CHECK(volume.getValue(Coord(0, -2, 0)) == Approx(0.9f).margin(1e-4));
@@ -52,7 +53,7 @@ TEST_CASE("what planes cut off is exact") {
     CHECK(faces.getValue(Coord(2, 0, 0)).y() == Approx(0.2f).margin(1e-4));
     CHECK(faces.getValue(Coord(2, 0, 0)).z() == Approx(0.2f).margin(1e-4));
     CHECK(faces.getValue(Coord(3, 0, 0)).x() == 1);
-    CHECK_FALSE(solid.openVolume->tree().isValueOn(Coord(3, 0, 0)));
+    CHECK_FALSE(solid.cellFluidFraction->tree().isValueOn(Coord(3, 0, 0)));
 }
 
 TEST_CASE("open parts leave the body's volume, by cells and by faces, to second order") {
@@ -84,9 +85,9 @@ TEST_CASE("faces and cells of a stretched field agree with its mesh's") {
     const fluid::Solid byField = fluid::solid(field, placement, *cells), byMesh = fluid::solid(mesh, placement, *cells);
     CHECK(openvdb::tools::checkLevelSet(*byMesh.distance, 1) == "");
     double most = 0;
-    for (auto v = byMesh.openVolume->cbeginValueOn(); v; ++v)
+    for (auto v = byMesh.cellFluidFraction->cbeginValueOn(); v; ++v)
         if (v.isVoxelValue())
-            most = std::max(most, double(std::abs(*v - byField.openVolume->tree().getValue(v.getCoord()))));
+            most = std::max(most, double(std::abs(*v - byField.cellFluidFraction->tree().getValue(v.getCoord()))));
     CHECK(most < 0.02);
     CHECK(sumsOf(byField).cells == Approx(sumsOf(byMesh).cells).epsilon(1e-3));
 }

@@ -21,7 +21,7 @@
 namespace bilayer::test {
 namespace {
 
-constexpr std::size_t maxErrorBytes = 1000;  // [bytes] without the path: readers quote at most some words of a file
+constexpr std::size_t maxErrorBytes = 500;  // without the path: readers quote at most some words of a file
 // words of libraries that say nothing about a file
 constexpr const char* jargon[] = {"std::", "::_M_", "basic_string", "stoi", "stol", "exception", "damaged answer"};
 
@@ -154,16 +154,17 @@ void checkGltf(Bytes file) {
 
 void checkScenes(Bytes file) {
     static const std::vector<SceneFile> formats = sceneFiles();
+    static const std::vector<SceneFile> parts = parts3mf();
     if (file.empty()) return;
-    const unsigned format = file[0] % (formats.size() + 1);
+    const std::size_t format = file[0] % (formats.size() + parts.size());
     std::string bytes(file.begin() + 1, file.end());
     std::filesystem::path name = "fuzz.3mf";
     if (format < formats.size()) {
         name = "fuzz" + std::filesystem::path(formats[format].name).extension().string();
-    } else {  // the model within an archive
-        std::vector<SceneFile> parts = parts3mf();
-        parts.back().bytes = bytes;
-        bytes = zip(parts);
+    } else {  // a part of an archive that is whole
+        std::vector<SceneFile> edited = parts;
+        edited[format - formats.size()].bytes = bytes;
+        bytes = zip(edited);
     }
     checkReader({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, name.c_str(), readShortly);
 }

@@ -163,11 +163,17 @@ Seeds gltfSeeds() {
     return {gltfText(true), triangleGlb(), skinnedGlb()};
 }
 
-/// The first byte is the number of the format; see checkScenes().
+/// The first byte is the number of the format; see checkScenes(). Small bytes behind a header are counts and sizes.
 Seeds sceneSeeds() {
+    std::string smallBytes;
+    for (int i = 0; i < 400; ++i) smallBytes += char(i % 9);
     Seeds seeds;
-    for (const SceneFile& file : sceneFiles()) seeds.push_back(char(seeds.size()) + file.bytes);
-    seeds.push_back(char(seeds.size()) + parts3mf().back().bytes);
+    char format = 0;
+    for (const SceneFile& file : sceneFiles()) {
+        seeds.push_back(format + file.bytes);
+        seeds.push_back(format++ + file.bytes + smallBytes);
+    }
+    for (const SceneFile& part : parts3mf()) seeds.push_back(format++ + part.bytes);
     return seeds;
 }
 

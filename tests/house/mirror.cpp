@@ -98,14 +98,16 @@ TEST_CASE("each unit has a test file of its name, or names the one that covers i
         }
         count += units.size();
         for (const auto& [unit, line] : units) {
-            if (line.files.empty() && !fs::exists(root / ownTest(library, unit)))
-                wrong +=
-                    unit + ": there is no " + ownTest(library, unit) + ", and its header has no line \"Tested by\"\n";
-            for (const std::string& test : line.files)
+            const std::string own = ownTest(library, unit);
+            if (line.files.empty() && !fs::exists(root / own))
+                wrong += unit + ": there is no " + own + ", and its header has no line \"Tested by\"\n";
+            for (const std::string& test : line.files.empty() ? std::set{own} : line.files)
                 if (!fs::exists(root / test))
                     wrong += unit + " names " + test + ", which does not exist\n";
+                else if (contents(test).find("TEST_CASE(") == std::string::npos)
+                    wrong += test + ", of " + unit + ", has no test\n";
                 else if (!reaches(contents(test), unit, contents(unit + ".h"), line.through))
-                    wrong += unit + " names " + test + ", which neither includes it nor uses a name of it\n";
+                    wrong += unit + " has " + test + ", which neither includes it nor uses a name of it\n";
         }
     }
     CHECK(wrong == "");

@@ -19,7 +19,7 @@ clean=(env -i PATH="$PATH" HOME="$scratch")
 "${clean[@]}" OCL_ICD_VENDORS="$driver" "$pack/run" test_cl 'OpenCL and TBB agree without triangles'
 "${clean[@]}" OCL_ICD_VENDORS="$driver" "$pack/run" bench_opencl --mesh "$pack/meshes/tetrahedron.obj" --resolution 32 \
   --repetitions 1
-# and by NVIDIA's name, as it is found where nothing else is said; PoCL looks for its parts beside itself
+# and by NVIDIA's name, as it is found where nothing else is said; PoCL looks for its parts next to itself
 mkdir "$scratch/driver"
 ln -s "$driver" "$scratch/driver/libnvidia-opencl.so.1"
 ln -s "${driver%/*}/pocl" "$scratch/driver"

@@ -77,7 +77,7 @@ def test_obstacles_far_from_zero_are_those_near_it(is_field):
     options = {"velocity": (1, 2, 3), "angular_velocity": (0, 1, 2)}
     here, there = (bilayer.obstacle(body, 0.125, TURNED, 1.5, **options) for body in (solid, moved))
     assert np.array_equal(here.origin + origin, there.origin)
-    for name in ("distance", "velocity", "open_faces", "open_volume"):
+    for name in ("distance", "velocity", "face_fluid_fraction", "cell_fluid_fraction"):
         assert np.allclose(getattr(here, name), getattr(there, name), atol=1e-6)
 
 
@@ -143,8 +143,8 @@ def test_obstacle(tmp_path):
     ball = bilayer.sphere(0.5, subdivisions=4)
     obstacle = bilayer.obstacle(ball, 0.05, bilayer.Pose((1, 0, 0)), velocity=(0, 0, 3))
     shape = obstacle.distance.shape
-    assert obstacle.open_volume.shape == shape and obstacle.open_faces.shape == obstacle.velocity.shape == shape + (3,)
-    closed = (1 - obstacle.open_volume).sum() * 0.05**3
+    assert obstacle.cell_fluid_fraction.shape == shape and obstacle.face_fluid_fraction.shape == obstacle.velocity.shape == shape + (3,)
+    closed = (1 - obstacle.cell_fluid_fraction).sum() * 0.05**3
     assert closed == pytest.approx(bilayer.mass_properties(ball).volume, rel=0.01)
     index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
     truth = np.linalg.norm(obstacle.origin + obstacle.voxel_size * index - [1, 0, 0], axis=-1) - 0.5
@@ -153,7 +153,7 @@ def test_obstacle(tmp_path):
     assert np.allclose(obstacle.velocity[near][:, 2], 3)
     for again in (pickle.loads(pickle.dumps(obstacle)), copy.copy(obstacle), copy.deepcopy(obstacle)):
         assert np.array_equal(again.distance, obstacle.distance) and np.array_equal(again.origin, obstacle.origin)
-        assert np.array_equal(again.open_faces, obstacle.open_faces)
+        assert np.array_equal(again.face_fluid_fraction, obstacle.face_fluid_fraction)
         assert np.array_equal(again.velocity, obstacle.velocity)
         assert again == obstacle
     assert obstacle != bilayer.obstacle(ball, 0.05, velocity=(0, 0, 3)) and obstacle != 1

@@ -44,7 +44,7 @@ void checkSides(const Mesh& mesh, unsigned seed) {
 
 }  // namespace
 
-TEST_CASE("the last resort knows the side of every point") {
+TEST_CASE("the fallback sign test finds the side of every point") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     const Mesh box = shapes::box({1, 1, 1}, 4), knot = shapes::torusKnot(2, 3, 1, 0.3f, 100, 12);

@@ -70,17 +70,17 @@ TEST_CASE("build --body stores the data of bodies, and info reports it") {
     CHECK(info["mass"] == info["body"]["mass"]);
     CHECK_THAT(run({"info", output}).out, Catch::Contains("surface points, margin 0.02 m, 1,280 triangles"));
     CHECK(info["body"]["triangles"] == json["triangles"]);
-    CHECK(info["body"]["contacts"] == "edges");
+    CHECK(info["body"]["contacts"] == "exact-near-features");
     CHECK(body.mesh().triangles == readMesh(sphereFile()).triangles);
     CHECK(body.field().mesh());
     const auto fine = buildSphere(output, {"--voxel-size", "0.05", "--body", "--point-spacing", "1"});
     CHECK(fine["body"]["points"] > json["body"]["points"]);
     CHECK(fine["body"]["margin"] == 0.05);
-    for (const std::string measure : {"triangles", "samples"}) {
-        const auto other = buildSphere(output, {"--voxel-size", "0.05", "--body", "--contacts", measure});
-        CHECK(other["body"]["contacts"] == measure);
-        CHECK(nameOf(Collider(readVdb(output)).data().body.accuracy) == measure);
-        CHECK((Collider(readVdb(output)).field().mesh() != nullptr) == (measure == "triangles"));
+    for (const std::string accuracy : {"exact", "samples"}) {
+        const auto other = buildSphere(output, {"--voxel-size", "0.05", "--body", "--contacts", accuracy});
+        CHECK(other["body"]["contacts"] == accuracy);
+        CHECK(nameOf(Collider(readVdb(output)).data().body.accuracy) == accuracy);
+        CHECK((Collider(readVdb(output)).field().mesh() != nullptr) == (accuracy == "exact"));
         CHECK(Collider(readVdb(output)).exactField().mesh());
     }
     const auto whole = std::filesystem::file_size(output);

@@ -75,8 +75,8 @@ TEST_CASE("incomplete options of bodies and scenes are wrong usage") {
     requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--margin", "0.1"}), "--margin: needs --body");
     requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--point-spacing", "1"}), "--point-spacing: needs --body");
     requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--no-mesh"}), "--no-mesh: needs --body");
-    requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--contacts", "edges"}), "--contacts: needs --body");
-    requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--body", "--no-mesh", "--contacts", "edges"}),
+    requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--contacts", "exact"}), "--contacts: needs --body");
+    requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--body", "--no-mesh", "--contacts", "exact"}),
                  "excludes");
     requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--body", "--contacts", "thumb"}), "--contacts");
     for (const char* word : {"0", "-1", "nan", "inf", "x"}) {

@@ -106,8 +106,8 @@ void writeThumbnail(const std::filesystem::path& path, const Mesh& mesh) {
 // One conversion. It fills the record as it goes, so that a failure keeps what is known.
 class Conversion {
   public:
-    Conversion(const ConversionOptions& options, const ConversionTask& task, const TellKnown& tell, Json& record)
-        : options_(options), task_(task), tell_(tell), build_(options.build), record_(record) {
+    Conversion(const ConversionOptions& options, const ConversionTask& task, const ReportKnown& report, Json& record)
+        : options_(options), task_(task), report_(report), build_(options.build), record_(record) {
         build_.mesh = task.mesh;
         build_.output = task.output;
         build_.options.threads = task.threads;
@@ -118,7 +118,7 @@ class Conversion {
         const Stopwatch hashing;
         key_ = {meshFileHash(task_.mesh), contentHash(options_.optionsText)};
         record_["sourceHash"] = hex(key_.source);
-        tell_(record_);
+        report_(record_);
         const bool isFinished = isUpToDate(task_.output, key_);
         hashSeconds_ = hashing.seconds();
         if (isFinished) return "skipped";
@@ -131,7 +131,7 @@ class Conversion {
         const double bytes = memoryOf(mesh, build_.options);
         record_["triangles"] = mesh.triangles.size();
         record_["estimatedBytes"] = std::uint64_t(bytes);
-        tell_(record_);
+        report_(record_);
         if (!task_.mayBeLarge && bytes > double(options_.largeBytes)) return "large";
         build(mesh);
         return "done";
@@ -157,7 +157,7 @@ class Conversion {
 
     const ConversionOptions& options_;
     const ConversionTask& task_;
-    const TellKnown& tell_;
+    const ReportKnown& report_;
     BuildArguments build_;
     Json& record_;
     ContentKey key_;
@@ -177,11 +177,11 @@ void limitThreads(int count) {
 
 }  // namespace
 
-Json convert(const ConversionOptions& options, const ConversionTask& task, const TellKnown& tell) {
+Json convert(const ConversionOptions& options, const ConversionTask& task, const ReportKnown& report) {
     limitThreads(task.threads);
     Json record;
     try {
-        record["outcome"] = Conversion(options, task, tell, record).run();
+        record["outcome"] = Conversion(options, task, report, record).run();
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {

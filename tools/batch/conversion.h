@@ -30,7 +30,7 @@ struct ConversionTask {
 };
 
 /// Is given what a record has so far, in case that the conversion ends the process.
-using TellKnown = std::function<void(const Json&)>;
+using ReportKnown = std::function<void(const Json&)>;
 
 /// Converts a mesh unless its output is up to date: made from a file of the same contents with the same options.
 ///
@@ -40,6 +40,6 @@ using TellKnown = std::function<void(const Json&)>;
 /// - "large": the mesh must be built alone; "estimatedBytes" states how much memory it needs;
 /// - "failed": "error" states why.
 /// The work folder holds a thumbnail if the mesh was read. Throws std::bad_alloc.
-Json convert(const ConversionOptions& options, const ConversionTask& task, const TellKnown& tell);
+Json convert(const ConversionOptions& options, const ConversionTask& task, const ReportKnown& report);
 
 }  // namespace bilayer::tools

@@ -48,7 +48,7 @@ std::vector<fs::path> linesOf(std::istream& stream) {
 
 std::vector<BatchMesh> meshesInTree(const fs::path& folder) {
     std::vector<BatchMesh> meshes;
-    // an iterator over all levels does not tell which folder it cannot read
+    // an iterator over all levels does not report which folder it cannot read
     std::vector<fs::path> folders{folder};
     while (!folders.empty()) {
         const fs::path current = std::move(folders.back());

@@ -126,8 +126,8 @@ class Scheduler {
     std::unique_ptr<Workplace> newWorkplace() {
         const std::string name = fmt::format("{}.{}", records_.path().stem().string(), workplaceCount_++);
         const fs::path folder = plan_.folder.work() / name;
-        const auto work = [this, folder](const WorkerTask& task, const Worker::Tell& tell) {
-            return packed(convert(task, folder, [&](const Json& known) { tell(packed(known)); }));
+        const auto work = [this, folder](const WorkerTask& task, const Worker::Report& report) {
+            return packed(convert(task, folder, [&](const Json& known) { report(packed(known)); }));
         };
         return std::unique_ptr<Workplace>(new Workplace{{folder, locks_}, {plan_.limits, work}});
     }
@@ -136,7 +136,7 @@ class Scheduler {
         return record.dump(-1, ' ', false, Json::error_handler_t::replace);
     }
 
-    Json convert(const WorkerTask& task, const fs::path& folder, const TellKnown& tell) const {
+    Json convert(const WorkerTask& task, const fs::path& folder, const ReportKnown& report) const {
         const BatchMesh& mesh = plan_.meshes[task.mesh];
         return tools::convert(plan_.conversion,
                               {.mesh = mesh.file,
@@ -144,7 +144,7 @@ class Scheduler {
                                .work = folder,
                                .threads = task.threads,
                                .mayBeLarge = task.isLarge || plan_.threads == 1},
-                              tell);
+                              report);
     }
 
     // Waits until a worker answers, ends or is late, a signal arrives, or something is to be looked at again.
@@ -173,7 +173,7 @@ class Scheduler {
             if (!hasEnded && worker.millisecondsLeft() != 0) continue;
             const WorkerEnd end = worker.finish();
             Json known = knownFrom(end);
-            if (hasEnded && worker.isUsed() && mayBeOfOthers(end, known)) {
+            if (hasEnded && worker.isUsed() && mayBeCausedByEarlierMeshes(end, known)) {
                 tryAlone(*running_[i]);
                 continue;
             }
@@ -186,14 +186,14 @@ class Scheduler {
 
     static Json knownFrom(const WorkerEnd& end) {
         const bool hasAnswered = !end.answer.empty();
-        Json known = Json::parse(hasAnswered ? end.answer : end.told, nullptr, /*allow_exceptions=*/false);
+        Json known = Json::parse(hasAnswered ? end.answer : end.reported, nullptr, /*allow_exceptions=*/false);
         if (!known.is_object()) known = Json::object();
         if (!hasAnswered) known.update({{"outcome", "failed"}, {"reason", end.reason}, {"error", end.error}});
         return known;
     }
 
-    // Whether what meshes before this one have left in the process may be why it failed: a new process decides.
-    bool mayBeOfOthers(const WorkerEnd& end, const Json& known) const {
+    // Whether earlier meshes in the same process may have caused the failure. The mesh is then tried in a new process.
+    bool mayBeCausedByEarlierMeshes(const WorkerEnd& end, const Json& known) const {
         return end.answer.empty() || (known["outcome"] == "failed" && plan_.limits.memory > 0);
     }
 

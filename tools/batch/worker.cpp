@@ -30,7 +30,7 @@ namespace {
 // Exit statuses of a child.
 constexpr int answered = 0, outOfMemory = 3, unexpectedEnd = 4;
 constexpr int keptMemory = 1 << 26;  // free memory that a worker keeps for its next task [bytes]
-constexpr char toldMark = '+';       // at the beginning of a line that is no answer yet
+constexpr char reportMark = '+';     // at the beginning of a line that is no answer yet
 constexpr off_t maxErrorText = 400;  // characters of standard error that a record quotes
 
 // Makes the standard streams those of a process without a terminal.
@@ -80,7 +80,7 @@ void serve(int socket, const Worker::Work& work) {
     while (::recv(socket, &task, sizeof task, MSG_WAITALL) == ssize_t(sizeof task)) {
         resetPeakMemory();
         const std::string answer =
-            work(task, [socket](const std::string& text) { send(socket, fmt::format("{}{}\n", toldMark, text)); });
+            work(task, [socket](const std::string& text) { send(socket, fmt::format("{}{}\n", reportMark, text)); });
         send(socket, fmt::format("{} {}\n", peakMemory(), answer));
     }
 }
@@ -153,7 +153,7 @@ void Worker::begin(const WorkerTask& task) {
     ++begun_;
     start_ = std::chrono::steady_clock::now();
     answer_.clear();
-    told_.clear();
+    reported_.clear();
     // the child's standard error has the same offset
     if (::ftruncate(errors_, 0) == 0) ::lseek(errors_, 0, SEEK_SET);
     // a child that has ended is noticed when it is read
@@ -168,8 +168,8 @@ bool Worker::read() {
         answer_.append(bytes, std::size_t(got));
     else
         hasEnded_ = true;
-    for (std::size_t end; answer_.starts_with(toldMark) && (end = answer_.find('\n')) != std::string::npos;) {
-        told_ = answer_.substr(1, end - 1);
+    for (std::size_t end; answer_.starts_with(reportMark) && (end = answer_.find('\n')) != std::string::npos;) {
+        reported_ = answer_.substr(1, end - 1);
         answer_.erase(0, end + 1);
     }
     return !hasEnded_ && !answer_.ends_with('\n');
@@ -196,7 +196,7 @@ WorkerEnd Worker::finish() {
     while (::wait4(process_, &status, 0, &usage) < 0 && errno == EINTR) {
     }
     process_ = -1;
-    end.told = told_;
+    end.reported = reported_;
     end.peakMemory = std::uint64_t(usage.ru_maxrss) * 1024;
     describeFailure(end, status);
     return end;

@@ -28,7 +28,7 @@ struct WorkerTask {
 /// How a task ended.
 struct WorkerEnd {
     std::string answer;            ///< what the work returned; empty if it failed
-    std::string told;              ///< what it told last before it failed
+    std::string reported;          ///< what it reported last before it failed
     std::string reason;            ///< why it failed: "crash", "time limit", "memory limit"; empty if it did not
     std::string error;             ///< the failure in a sentence without a full stop
     std::uint64_t peakMemory = 0;  ///< peak resident memory [bytes]
@@ -42,9 +42,9 @@ struct WorkerEnd {
 class Worker {
   public:
     /// Keeps a text without line breaks, in case that the process ends before it answers.
-    using Tell = std::function<void(const std::string&)>;
+    using Report = std::function<void(const std::string&)>;
     /// Returns an answer of at least one character, without line breaks.
-    using Work = std::function<std::string(const WorkerTask&, const Tell&)>;
+    using Work = std::function<std::string(const WorkerTask&, const Report&)>;
 
     /// Throws std::system_error if no process can be created.
     Worker(const WorkerLimits& limits, const Work& work);
@@ -76,7 +76,7 @@ class Worker {
 
     WorkerLimits limits_;
     std::chrono::steady_clock::time_point start_;  // of the task
-    std::string answer_, told_;
+    std::string answer_, reported_;
     bool hasEnded_ = false;
     int begun_ = 0;    // tasks
     int socket_ = -1;  // to the child: tasks there, lines of answers back

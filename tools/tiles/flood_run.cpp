@@ -31,7 +31,7 @@ void FloodRun::prepare(const std::vector<std::size_t>& share) {
     readSides();
     grow(Growth::byDistance, share);
     grow(Growth::byTriangles, share);
-    load_.seconds += watch.seconds();
+    exchange_.seconds += watch.seconds();
 }
 
 // A killed run may have left a tile's files.
@@ -80,7 +80,7 @@ void FloodRun::readSides() {
     HashedRecordReader record(folder_.regions());
     sides_.clear();
     for (std::size_t tile = 0; tile < tiles_.size(); ++tile) sides_.push_back(record.values<std::uint8_t>());
-    load_.bytes += record.size();
+    exchange_.bytes += record.size();
 }
 
 // Repeats until no tile of any rank improves. A tile may read what its neighbours write in the same round: whatever
@@ -120,7 +120,7 @@ bool FloodRun::improve(Growth growth, std::size_t tile, std::uint32_t round) {
 std::vector<BorderArrival> FloodRun::arrivalsOf(Growth growth, std::size_t tile) {
     const std::filesystem::path file = fileOf(growth, tile);
     if (!std::filesystem::exists(file)) return {};
-    load_.bytes += std::filesystem::file_size(file);
+    exchange_.bytes += std::filesystem::file_size(file);
     return readArrivals(file).all;
 }
 
@@ -136,7 +136,7 @@ FloodTile FloodRun::load(std::size_t tile, bool withTriangles) {
         neighbour.byDistance = arrivalsOf(Growth::byDistance, other);
         if (withTriangles) neighbour.byTriangles = arrivalsOf(Growth::byTriangles, other);
         const std::filesystem::path file = folder_.border(tiles_.tiling.place(other));
-        if (std::filesystem::exists(file)) load_.bytes += std::filesystem::file_size(file);
+        if (std::filesystem::exists(file)) exchange_.bytes += std::filesystem::file_size(file);
         flood.add(neighbour);
     }
     return flood;
@@ -180,8 +180,8 @@ BuiltTile FloodRun::build(std::size_t tile) {
     return flood.signedTile();
 }
 
-FloodRun::Load FloodRun::takeLoad() {
-    return std::exchange(load_, {});
+FloodRun::Exchange FloodRun::takeExchange() {
+    return std::exchange(exchange_, {});
 }
 
 }  // namespace bilayer::tools

@@ -31,12 +31,13 @@ class FloodRun {
     /// Builds a tile.
     detail::BuiltTile build(std::size_t tile);
 
-    /// Returns how many bytes of other tiles were read, and how long prepare() took, since the last call.
-    struct Load {
-        std::uint64_t bytes = 0;
+    /// The cost of prepare().
+    struct Exchange {
+        std::uint64_t bytes = 0;  ///< read of other tiles
         double seconds = 0;
     };
-    Load takeLoad();
+    /// Returns that since the last call.
+    Exchange takeExchange();
 
   private:
     enum class Growth { byDistance, byTriangles };
@@ -60,7 +61,7 @@ class FloodRun {
     const PlannedTiles& tiles_;
     const Ranks& ranks_;
     std::vector<detail::RegionSides> sides_;  // of all tiles
-    Load load_;
+    Exchange exchange_;
 };
 
 }  // namespace bilayer::tools

@@ -18,9 +18,9 @@ class MeshSort {
     MeshSort(BuildArguments& arguments, const glm::ivec3& counts, double budget, const TileFolder& folder)
         : a_(arguments), counts_(counts), budget_(budget), folder_(folder) {}
 
-    /// Replaces the plan. Removes all tiles if normals have contradicted each other.
+    /// Replaces the plan.
     /// @param identity  of the field
-    /// @param round     how often they have
+    /// @param round     count of earlier plans whose normals contradicted each other. Above 0, all tiles are removed
     /// @param known     the signs of tiles that are there and stay; or null
     /// Throws std::runtime_error if the mesh does not fit, and as decideSigns() does.
     void run(const Json& identity, int round, const PlannedSigns* known = nullptr);

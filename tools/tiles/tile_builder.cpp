@@ -64,16 +64,16 @@ void TileBuilder::build(std::size_t tile) {
     const std::uint64_t count = tiles_.load(tile).triangles, sumsBefore = sums_.readBytes();
     const bool isByFlood = tiles_.plan.signs().areByFlood();
     BuiltTile built = isByFlood ? flood_.build(tile) : this->built(tile);
-    const FloodRun::Load load = flood_.takeLoad();
+    const FloodRun::Exchange exchange = flood_.takeExchange();
     Json record = recordOf(place, tiles_.tiling.own(tile).within(tiles_.tiling.lattice()), count, built);
     record["readBytes"] = count * sizeof(TileTriangle);
-    record["sumBytes"] = sums_.readBytes() - sumsBefore + load.bytes;
+    record["sumBytes"] = sums_.readBytes() - sumsBefore + exchange.bytes;
     if (isByFlood && !built.grids) record["side"] = built.inside ? "inside" : "outside";
     if (built.grids) write(std::move(built), tile, record);
     built = {};
     ::malloc_trim(0);  // what one tile has used is free for the next
     record["rank"] = ranks_.rank;
-    record["seconds"] = watch.seconds() + load.seconds;
+    record["seconds"] = watch.seconds() + exchange.seconds;
     record["peakRssBytes"] = peakMemory();
     writeRecord(folder_.record(place), record);
 }

@@ -47,7 +47,7 @@ class TileFolder {
 
     /// Creates the folders that do not exist. Throws std::runtime_error that names the folder.
     void create() const;
-    /// Removes the plan, then what tiles of earlier signs told each other.
+    /// Removes the plan, then what tiles of earlier signs have exchanged.
     void removePlan() const;
     /// Removes the records of all tiles, which are then built anew.
     void removeRecords() const;

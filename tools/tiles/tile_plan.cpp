@@ -121,7 +121,7 @@ TilePlan::TilePlan(Json plan) : plan_(std::move(plan)) {
                               load.at("hash").get<std::uint64_t>()});
     } catch (const Json::exception& error) {
         throw std::runtime_error(
-            fmt::format("the plan of the tiles is damaged: remove the folder work ({})", error.what()));
+            fmt::format("the plan of the tiles is damaged: remove the folder `work` of the tiles ({})", error.what()));
     }
 }
 

@@ -45,12 +45,13 @@ void TilePlanner::planOrResume() {
     identity_ = identityOf(a_, counts_, hex(meshFileHash(a_.mesh)));
     if (std::filesystem::exists(folder_.manifest())) {
         readTileManifest(folder_.root());  // may throw
-        requireSame(readJson(folder_.manifest()));
-        if (isFinished()) return;
+        const Json manifest = readJson(folder_.manifest());
+        requireSame(manifest);
+        if (!reopenIfDamaged(manifest)) return;
     } else if (!resume()) {
         sort().run(identity_, 0);
     }
-    stateMemory();
+    requireMemory();
 }
 
 void TilePlanner::requireSame(const Json& made) const {
@@ -73,7 +74,7 @@ bool TilePlanner::resume() {
     bool isSorted = true;
     for (std::size_t tile = 0; tile < tiles.size(); ++tile) {
         const glm::ivec3 place = tiles.tiling.place(tile);
-        const bool isDone = tools::isFinished(folder_, place);
+        const bool isDone = isFinished(folder_, place);
         if (!isDone) std::filesystem::remove(folder_.record(place));
         if (!isDone || signs.needSums() || signs.areByFlood())
             isSorted = isSorted && hasTileTriangles(folder_.triangles(place), tiles.load(tile));
@@ -82,13 +83,13 @@ bool TilePlanner::resume() {
     return true;
 }
 
-/// Returns whether all tiles are intact. If not, the manifest becomes a plan and the records of those that are.
-bool TilePlanner::isFinished() {
-    const Json manifest = readJson(folder_.manifest()), records = manifest.at("tiles");
+/// Returns whether a tile is damaged. If one is, the manifest becomes a plan and the records of those that are intact.
+bool TilePlanner::reopenIfDamaged(const Json& manifest) {
+    const Json& records = manifest.at("tiles");
     const auto intact = [&](const Json& record) { return isIntact(folder_, record); };
     if (std::all_of(records.begin(), records.end(), intact)) {
         folder_.clean();  // a run that was killed at its end has not done so
-        return true;
+        return false;
     }
     const PlannedSigns signs = plannedSigns(manifest.at("signs"));
     folder_.create();
@@ -97,11 +98,11 @@ bool TilePlanner::isFinished() {
         if (intact(record)) writeRecord(folder_.record(placeOf(record)), record);
     sort().run(identity_, signs.round, &signs);
     std::filesystem::remove(folder_.manifest());
-    return false;
+    return true;
 }
 
-/// Refuses, before any tile is built, what would not fit.
-void TilePlanner::stateMemory() const {
+/// Prints the memory that a tile needs. Throws, before any tile is built, if there is not so much.
+void TilePlanner::requireMemory() const {
     const PlannedTiles tiles = this->tiles();
     const double largest = tiles.largestNeed(), join = tiles.needOfRecords();
     if (largest > budget_)
@@ -119,15 +120,17 @@ void TilePlanner::stateMemory() const {
 
 void TilePlanner::planAgain(const PlannedTiles& tiles, const SignCounts& sum) {
     const PlannedSigns& signs = tiles.plan.signs();
-    if (judge(sum) == SignVerdict::conflict) {
+    const bool isConflict = judge(sum) == SignVerdict::conflict;
+    if (isConflict) {
         sort().run(identity_, signs.round + 1);
-        if (TilePlan(readRecord(folder_.plan())).signs().areByFlood()) stateMemory();  // which needs more than others
     } else {
         for (std::size_t tile = 0; tile < tiles.size(); ++tile) folder_.remove(tiles.tiling.place(tile));
         writeRecord(folder_.plan(), tiles.plan.with({corrected(signs.signs, sum), signs.round}));
     }
+    const PlannedSigns planned = TilePlan(readRecord(folder_.plan())).signs();
+    if (isConflict && planned.areByFlood()) requireMemory();  // a flood needs more than other signs
     if (a_.json) return;
-    fmt::print("all tiles again: {}\n", TilePlan(readRecord(folder_.plan())).signs().signs.reason);
+    fmt::print("all tiles again: {}\n", planned.signs.reason);
     std::fflush(stdout);
 }
 

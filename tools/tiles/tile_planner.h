@@ -32,9 +32,9 @@ class TilePlanner {
   private:
     void planOrResume();
     bool resume();
-    bool isFinished();
+    bool reopenIfDamaged(const Json& manifest);
     void requireSame(const Json& made) const;
-    void stateMemory() const;
+    void requireMemory() const;
     PlannedTiles tiles() const { return plannedTiles(TilePlan(readRecord(folder_.plan())), a_, counts_); }
     MeshSort sort() { return {a_, counts_, budget_, folder_}; }
 

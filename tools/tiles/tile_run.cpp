@@ -12,6 +12,7 @@
 
 #include <bilayer/sdf/build.h>
 #include "sdf/base/usable_memory.h"
+#include "sdf/leaf/build_options.h"
 #include "sdf/tiles/tile_signs.h"
 #include "tools/tiles/planned_tiles.h"
 #include "tools/tiles/tile_builder.h"
@@ -121,8 +122,7 @@ class TileRun {
             if (const SignCounts sum = sumOf(counts); judge(sum) != SignVerdict::right)
                 return planner_->planAgain(tiles, sum);
         if (std::all_of(records.begin(), records.end(), [](const Json& r) { return r.at("activeVoxels") == 0; }))
-            throw std::invalid_argument(
-                "the half width is too small for this voxel size: no voxel lies within the band");
+            throw std::invalid_argument(noVoxelInBand(a_.options));
         if (!signs.areByFlood()) joinSides(records, counts_);
         Json manifest = tiles.plan.manifest(records, ranks_.count);
         manifest["sum"]["estimatedBytes"] = std::uint64_t(std::max(tiles.largestNeed(), tiles.needOfRecords()));

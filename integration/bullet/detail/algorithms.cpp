@@ -30,8 +30,8 @@ btCollisionAlgorithm* make(const btCollisionAlgorithmConstructionInfo& info, Arg
 
 /// Whether Bullet asks while it traverses a compound whose fields are collided by us. Otherwise a user asks, in a
 /// callback.
-bool isLeftOut(const StepState& state, const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
-    return state.leavesFields && (first.m_parent || second.m_parent);
+bool isSkipped(const StepState& state, const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
+    return state.skipsFieldsInCompounds && (first.m_parent || second.m_parent);
 }
 
 /// A pair of a field and a shape other than a compound.
@@ -78,7 +78,7 @@ struct CreatePair : btCollisionAlgorithmCreateFunc {
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                    const btCollisionObjectWrapper* first,
                                                    const btCollisionObjectWrapper* second) override {
-        if (isLeftOut(state, *first, *second)) return make<btEmptyAlgorithm>(info);
+        if (isSkipped(state, *first, *second)) return make<btEmptyAlgorithm>(info);
         return make<PairAlgorithm>(info, bIsSecond, state);
     }
 
@@ -93,10 +93,10 @@ struct CreateCompound : btCollisionAlgorithmCreateFunc {
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                    const btCollisionObjectWrapper* first,
                                                    const btCollisionObjectWrapper* second) override {
-        const bool ours = !isLeftOut(state, *first, *second) &&
+        const bool ours = !isSkipped(state, *first, *second) &&
                           (holdsField(*first->getCollisionShape()) || holdsField(*second->getCollisionShape()));
         if (!ours) return ofBullet.CreateCollisionAlgorithm(info, first, second);
-        const LeftToBullet left(state);  // it creates some algorithms of the children at once
+        const CompoundByBullet left(state);  // it creates some algorithms of the children at once
         btCollisionAlgorithm* rest = ofBullet.CreateCollisionAlgorithm(info, first, second);
         return make<CompoundAlgorithm>(info, rest, state);
     }
@@ -142,13 +142,16 @@ bool StepState::isTest(const btManifoldResult& result) const {
 }
 
 float StepState::secondsOf(const btDispatcherInfo& info, bool isTest) const {
-    if (!isForeign) return seconds;
+    if (!hasOtherDispatcher) return seconds;
     return isTest ? 0 : info.m_timeStep;
 }
 
 Task StepState::taskOf(std::shared_ptr<Pair> pair, Side a, Side b) const {
-    const auto isLeft = [](const Side& side) { return side.object->isKinematicObject() || locks(*side.shape); };
-    if (!speculatesOnAll && !isLeft(a) && !isLeft(b) && mayPassEachOther(a, b)) a.seconds = b.seconds = 0;
+    const auto needsSpeculation = [](const Side& side) {
+        return side.object->isKinematicObject() || locks(*side.shape);
+    };
+    if (!speculatesOnAll && !needsSpeculation(a) && !needsSpeculation(b) && mayPassEachOther(a, b))
+        a.seconds = b.seconds = 0;
     return {std::move(pair), a, b};
 }
 

@@ -33,8 +33,8 @@ struct StepState {
     DispatchStatistics running{};  ///< includes contact tests between steps
     float seconds = 0;             ///< duration of the step [s]; 0 between steps
     bool speculatesOnAll = true;
-    bool isForeign = false;     ///< the dispatcher is not ours and does not report its steps
-    bool leavesFields = false;  ///< Bullet traverses a compound; its fields are collided by us
+    bool hasOtherDispatcher = false;      ///< the dispatcher is not ours and does not report its steps
+    bool skipsFieldsInCompounds = false;  ///< Bullet traverses a compound; its fields are collided by us
 
     /// Whether the call is a contact test. Contact tests ask for a distance, or pass a result of their own kind, and
     /// run outside a step.
@@ -47,12 +47,13 @@ struct StepState {
 };
 
 /// Scope guard: during its lifetime Bullet traverses a compound and skips the fields in it.
-class LeftToBullet {
+class CompoundByBullet {
   public:
-    explicit LeftToBullet(StepState& state) : state_(state), before_(std::exchange(state.leavesFields, true)) {}
-    ~LeftToBullet() { state_.leavesFields = before_; }
-    LeftToBullet(const LeftToBullet&) = delete;
-    LeftToBullet& operator=(const LeftToBullet&) = delete;
+    explicit CompoundByBullet(StepState& state)
+        : state_(state), before_(std::exchange(state.skipsFieldsInCompounds, true)) {}
+    ~CompoundByBullet() { state_.skipsFieldsInCompounds = before_; }
+    CompoundByBullet(const CompoundByBullet&) = delete;
+    CompoundByBullet& operator=(const CompoundByBullet&) = delete;
 
   private:
     StepState& state_;
@@ -91,7 +92,7 @@ class FieldAlgorithmFunctions {
   private:
     struct Functions;
     std::unique_ptr<Functions> functions_;
-    FieldDispatcherMark knows_;
+    FieldDispatcherMark dispatcherMark_;
 };
 
 }  // namespace bilayer::bullet::detail

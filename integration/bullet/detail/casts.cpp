@@ -24,7 +24,7 @@ constexpr float caution = 0.8f;
 constexpr int maxSteps = 100000;
 }  // namespace
 
-bool sweepable(const Placed& body, float radius) {
+bool bandFitsSphere(const Placed& body, float radius) {
     const Field& field = body.collider.field();
     // Beyond the band the distance is a lower bound, which falls to this value near the band. A sphere of that radius
     // could touch anywhere there.
@@ -32,7 +32,7 @@ bool sweepable(const Placed& body, float radius) {
     return radius < body.scale * minBound;
 }
 
-std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, const glm::vec3& to, float radius,
+std::optional<CastHit> castSphereOn(const Placed& body, const glm::vec3& from, const glm::vec3& to, float radius,
                                     float allowed) {
     const Field& field = body.collider.field();
     const glm::vec3 start = body.pose.toBody(from) / body.scale, end = body.pose.toBody(to) / body.scale;
@@ -52,7 +52,7 @@ std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, c
             if (inward) {
                 const glm::vec3 normal = glm::normalize(sample.gradient);
                 const glm::vec3 point = centre - sample.distance * normal;
-                return SweepHit{travelled / length, body.pose.toWorld(body.scale * point), body.pose.rotation * normal};
+                return CastHit{travelled / length, body.pose.toWorld(body.scale * point), body.pose.rotation * normal};
             }
             if (!sample.inBand) return std::nullopt;
         }
@@ -62,15 +62,15 @@ std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, c
     return std::nullopt;
 }
 
-std::optional<SweepHit> sweepSphere(const MeshTree& mesh, const glm::vec3& from, const glm::vec3& to, float radius) {
+std::optional<CastHit> castSphereOn(const MeshTree& mesh, const glm::vec3& from, const glm::vec3& to, float radius) {
     const glm::dvec3 displacement = glm::dvec3(to) - glm::dvec3(from);
     const double length = glm::length(displacement);
     if (!(length > 0)) return std::nullopt;
     const Path path{glm::dvec3(from), displacement / length, length};
     const auto touch = firstTouchOnPath(mesh, path, radius, [](const glm::dvec3&) { return 0.; });
     if (!touch) return std::nullopt;
-    return SweepHit{static_cast<float>(touch->along / length), glm::vec3(touch->position), glm::vec3(touch->normal),
-                    static_cast<int>(touch->triangle)};
+    return CastHit{static_cast<float>(touch->along / length), glm::vec3(touch->position), glm::vec3(touch->normal),
+                   static_cast<int>(touch->triangle)};
 }
 
 bool touches(const MeshTree& mesh, const glm::vec3& centre, float radius) {

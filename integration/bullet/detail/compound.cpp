@@ -226,7 +226,7 @@ void CompoundAlgorithm::gather(const btCollisionObjectWrapper& first, const btCo
 void CompoundAlgorithm::processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
                                          const btDispatcherInfo& info, btManifoldResult* result) {
     {
-        const LeftToBullet left(state_);
+        const CompoundByBullet left(state_);
         rest_->processCollision(first, second, info, result);
     }
     const bool isTest = state_.isTest(*result);

@@ -125,7 +125,7 @@ Convex spheresOf(const btMultiSphereShape& shape) {
 /// same numbers.
 class Passing : public btTriangleCallback {
   public:
-    explicit Passing(const TriangleSheet::Visitor& visitor) : visitor_(visitor) {}
+    explicit Passing(const OpenSurface::Visitor& visitor) : visitor_(visitor) {}
 
     void processTriangle(btVector3* corners, int part, int index) override {
         const bool isSecond = part == lastPart_ && index == lastIndex_;
@@ -136,7 +136,7 @@ class Passing : public btTriangleCallback {
     }
 
   private:
-    const TriangleSheet::Visitor& visitor_;
+    const OpenSurface::Visitor& visitor_;
     int lastPart_ = -1, lastIndex_ = -1;
 };
 
@@ -172,8 +172,8 @@ Convex convexOf(const btConvexShape& shape) {
     }
 }
 
-TriangleSheet sheetOf(const btConcaveShape& shape) {
-    return {[&shape](const Bounds& box, const TriangleSheet::Visitor& visitor) {
+OpenSurface openSurfaceOf(const btConcaveShape& shape) {
+    return {[&shape](const Bounds& box, const OpenSurface::Visitor& visitor) {
         Passing passing(visitor);
         shape.processAllTriangles(&passing, toBullet(box.lower), toBullet(box.upper));
     }};
@@ -187,7 +187,7 @@ ContactShape contactShapeOf(const btCollisionShape& shape) {
         const auto& plane = static_cast<const btStaticPlaneShape&>(shape);
         return ContactShape(ContactShapeData{HalfSpace{toGlm(plane.getPlaneNormal()), plane.getPlaneConstant()}});
     }
-    return ContactShape::triangles(sheetOf(static_cast<const btConcaveShape&>(shape)));
+    return ContactShape::triangles(openSurfaceOf(static_cast<const btConcaveShape&>(shape)));
 }
 
 ConvexShape::ConvexShape(const btConvexShape& shape)

@@ -21,8 +21,8 @@ using namespace bilayer::detail;
 Convex convexOf(const btConvexShape& shape);
 
 /// The triangles of a mesh or a height field.
-/// @param shape  must outlive the sheet
-TriangleSheet sheetOf(const btConcaveShape& shape);
+/// @param shape  must outlive the open surface
+OpenSurface openSurfaceOf(const btConcaveShape& shape);
 
 /// A shape other than a compound, without its pose. A field's pose and scale are those of Shape::placed().
 /// @param shape  must outlive the contact shape, if it has triangles

@@ -246,7 +246,7 @@ class SweptPairs {
         }
     }
 
-    /// Where a body was at the start of the step. Its velocity tells, if nothing was recorded.
+    /// Where a body was at the start of the step. Found from its velocity if nothing was recorded.
     btTransform startOf(const btCollisionObject& object) const {
         if (const btTransform* start = starts_.find(object)) return *start;
         btTransform start = object.getWorldTransform();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Continuous collision: stops bodies at the surfaces that a step would take them through.
+// Tested by tests/bullet/continuous_collision.cpp through WorldExtensions.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rest stabilisation: bodies at rest keep their positions.
+// Tested by tests/bullet/rest_stabilisation.cpp through WorldExtensions.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>

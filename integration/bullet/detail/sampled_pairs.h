@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pairs of fields of a step whose points a sampler samples in one batch, for example on an OpenCL device.
+// Tested by tests/bullet/sampled_pairs.cpp through PointSampler.
 #pragma once
 
 #include <cstddef>

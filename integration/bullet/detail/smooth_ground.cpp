@@ -73,7 +73,7 @@ float edgeAngleUnder(const btRigidBody& body, const btCollisionShape& shape, con
         const btVector3 corners[] = {toBullet(triangle[0]), toBullet(triangle[1]), toBullet(triangle[2])};
         if (TestTriangleAgainstAabb2(corners, lower, upper)) triangles.push_back(triangle);
     };
-    sheetOf(static_cast<const btConcaveShape&>(shape)).visit({toGlm(lower), toGlm(upper)}, add);
+    openSurfaceOf(static_cast<const btConcaveShape&>(shape)).visit({toGlm(lower), toGlm(upper)}, add);
     return maxSmoothEdgeAngle(triangles);
 }
 

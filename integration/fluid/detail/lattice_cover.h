@@ -22,9 +22,9 @@ struct WidePlace {
 /// [voxels].
 inline constexpr double coveringWidthVoxels = 2.17;
 
-/// Asks which lattices of voxels have a voxel inside of a body. Points are inside if their winding number is above one
-/// half. The answers depend on the body, its rotation and its size in voxels, not on its position. The mesh must be
-/// valid and face outward (see orient()).
+/// Tests whether every lattice of voxels has a voxel inside of a body. Points are inside if their winding number is
+/// above one half. The answers depend on the body, its rotation and its size in voxels, not on its position. The mesh
+/// must be valid and face outward (see orient()).
 class LatticeCover {
   public:
     /// Keeps a reference to the mesh.
@@ -37,7 +37,7 @@ class LatticeCover {
     /// voxel must be that deep inside. A plate along the lattice is thus wide enough from 1.44 voxels on.
     bool isComplete() const;
 
-    /// The widest place that climbs from some triangles reach.
+    /// The widest place that hill climbing from some of the triangles finds. The body may have a wider one.
     WidePlace widestPlace() const;
 
   private:

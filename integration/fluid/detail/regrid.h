@@ -26,7 +26,7 @@ inline constexpr float minHalfWidthVoxels = 3;
 /// @param uniteSolids  as BuildOptions::unite
 ///
 /// Throws std::invalid_argument for
-/// - a placement that check() refuses, or one beyond the range of OpenVDB's coordinates;
+/// - a placement that checkPlacement() refuses, or one beyond the range of OpenVDB's coordinates;
 /// - voxels that are not cubes or mirrored;
 /// - a mesh with a hole wider than two voxels (hole_width.h), at any position of the voxels;
 /// - a body that would lie between the voxels at some position of them (lattice_cover.h);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Repairs a combined level set so that openvdb::tools::checkLevelSet accepts it.
+// Tested by tests/fluid/repair.cpp through seed().
 #pragma once
 
 #include <openvdb/openvdb.h>

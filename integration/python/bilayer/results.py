@@ -142,7 +142,7 @@ class Contacts(_Fields):
     those of b.
     approach: float32 (N,), by how much the motions reduce the distance, in the meshes' unit; 0 for motions within the
     margin.
-    turning_radius: float32 (N,), rounding radius of the vertex or edge that the contact stays on while its body
+    rounding_radius: float32 (N,), rounding radius of the vertex or edge that the contact stays on while its body
     rotates, in the meshes' unit; negative where the contact moves along as the surfaces roll.
     points_tested: int, surface points that were sampled in the other body's field.
     beyond_band: int, those of them that are too deep inside for the band, and make no contact.
@@ -160,7 +160,7 @@ class Contacts(_Fields):
     distance: Floats
     feature: NDArray[np.uint32]
     approach: Floats
-    turning_radius: Floats
+    rounding_radius: Floats
     points_tested: int
     beyond_band: int
 
