@@ -15,12 +15,12 @@ using namespace detail;
 namespace {
 
 Mesh readByEnding(const std::filesystem::path& path, ReadReport& report) {
-    const std::string ending = lowerEnding(path);
-    if (ending == ".obj") return readObj(path, report);
-    if (ending == ".ply") return readPly(path, report);
-    if (ending == ".stl") return readStl(path, report);
-    if (ending == ".off") return readOff(path, report);
-    if (ending == ".raw") return readRaw(path, report);
+    const std::string extension = lowerExtension(path);
+    if (extension == ".obj") return readObj(path, report);
+    if (extension == ".ply") return readPly(path, report);
+    if (extension == ".stl") return readStl(path, report);
+    if (extension == ".off") return readOff(path, report);
+    if (extension == ".raw") return readRaw(path, report);
     requireInputFile(path);
     return assembled(readScene(path), path, report);
 }

@@ -124,8 +124,8 @@ std::string requireNanoEnding(const std::string& path) {
 }
 
 std::string requireMeshEnding(const std::string& path) {
-    const std::string ending = std::filesystem::path(path).extension().string();
-    return ending == ".ply" || ending == ".obj" || ending == ".stl" ? "" : "must end in .ply, .obj or .stl";
+    const std::string extension = std::filesystem::path(path).extension().string();
+    return extension == ".ply" || extension == ".obj" || extension == ".stl" ? "" : "must end in .ply, .obj or .stl";
 }
 
 }  // namespace

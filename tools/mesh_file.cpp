@@ -29,7 +29,7 @@ constexpr double bytesPerImportedByte = 100;
 constexpr double bytesPerSceneTriangle = 120;
 
 bool isGltf(const std::filesystem::path& path) {
-    return lowerEnding(path) == ".gltf" || lowerEnding(path) == ".glb";
+    return lowerExtension(path) == ".gltf" || lowerExtension(path) == ".glb";
 }
 
 // Calls visit(scene, buffers) for a glTF file. A damaged file ends the visit: reading the mesh reports the damage.
@@ -63,7 +63,7 @@ double trianglesOf(const json& scene, const json& mesh) {
 
 std::uint64_t meshFileHash(const std::filesystem::path& path) {
     std::uint64_t hash = contentHash(MappedFile(path).bytes());
-    if (lowerEnding(path) == ".gltf")
+    if (lowerExtension(path) == ".gltf")
         visitScene(path, [&](const json&, const std::vector<Bytes>& buffers) {
             for (const Bytes& bytes : buffers)
                 hash = mixedHash(hash, contentHash({reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
@@ -76,7 +76,7 @@ double bytesToRead(const std::filesystem::path& path) {
     const auto size = double(std::filesystem::file_size(path));
     double need = size * bytesPerImportedByte;
     for (const char* direct : {".obj", ".ply", ".stl", ".off", ".raw", ".gltf", ".glb"})
-        if (lowerEnding(path) == direct) need = size * bytesPerFileByte;
+        if (lowerExtension(path) == direct) need = size * bytesPerFileByte;
     if (isGltf(path))
         visitScene(path, [&](const json& scene, const std::vector<Bytes>& buffers) {
             double held = 0, triangles = 0;

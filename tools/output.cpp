@@ -50,7 +50,7 @@ void addOrigin(Table& table, const glm::dvec3& origin) {
         table.row("origin", fmt::format("{} {} {} m: coordinates are relative to it", origin.x, origin.y, origin.z));
 }
 
-std::string holes(const MeshReport& report) {
+std::string describeClosedness(const MeshReport& report) {
     return fmt::format("{} ({} boundary edges in {} loops, {} non-manifold edges, {} non-manifold vertices)",
                        report.closed() ? "yes" : "no", grouped(report.boundaryEdges), grouped(report.boundaryLoops),
                        grouped(report.nonManifoldEdges), grouped(report.nonManifoldVertices));
@@ -160,7 +160,7 @@ void addRows(Table& table, const MeshReport& report, float wall) {
     table.row("components", grouped(report.components));
     table.row("bounds", boxText(report.bounds, report.origin));
     addOrigin(table, report.origin);
-    table.row("closed", holes(report));
+    table.row("closed", describeClosedness(report));
     table.row("oriented", orientation(report));
     table.row("self-intersections", fmt::format("{} pairs of triangles", grouped(report.selfIntersections)));
     table.row("degenerate triangles", grouped(report.degenerateTriangles));

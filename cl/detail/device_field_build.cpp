@@ -27,7 +27,7 @@ namespace {
 
 constexpr std::size_t itemsAlongParts = 32;        // along z, which is contiguous in memory
 constexpr cl_int unknownEntry = -3;                // UNKNOWN of field_build.cl
-constexpr cl_float maxParts = 16;                  // MAX_PARTS of field_build.cl
+constexpr cl_float maxCells = 16;                  // MAX_PARTS of field_build.cl
 constexpr const char* fieldPurpose = "the field";  // of memory, for error texts
 
 // `Widths` of field_build.cl.
@@ -90,7 +90,7 @@ class DeviceFieldBuilder {
     // Enqueues a kernel with a work-item for each coarse cell that has a clearance.
     template <class... Arguments>
     void enqueueParts(const char* name, const Arguments&... arguments) {
-        const glm::ivec3 size = layout_.frame.parts();
+        const glm::ivec3 size = layout_.frame.coarseCells();
         enqueue(name, cl::NDRange(roundedUp(std::size_t(size.z), itemsAlongParts), size.y, size.x),
                 cl::NDRange(itemsAlongParts, 1, 1), arguments...);
     }
@@ -230,9 +230,9 @@ void DeviceFieldBuilder::countConflicts() {
 
 void DeviceFieldBuilder::computeClearances() {
     const KernelFrame frame(layout_.frame);
-    const glm::ivec3 size = layout_.frame.parts();
+    const glm::ivec3 size = layout_.frame.coarseCells();
     const std::size_t count = std::size_t(size.x) * size.y * size.z;
-    const cl_float far = layout_.frame.findsSurface() ? maxParts * maxParts : 0;
+    const cl_float far = layout_.frame.findsSurface() ? maxCells * maxCells : 0;
     layout_.centres = memory_.allocate(count * sizeof(cl_char), fieldPurpose);
     std::array<cl::Buffer, 2> distances2;
     for (cl::Buffer& buffer : distances2) buffer = memory_.allocate(count * sizeof(cl_float), fieldPurpose);

@@ -43,7 +43,7 @@ struct BodyTransform {
 
     /// The same transform, into the coarse cells of a field's clearance.
     BodyTransform intoCoarseCells(const Field& field) const {
-        const float edge = float(Clearance::partSide) * field.voxelSize();
+        const float edge = float(Clearance::cellSide) * field.voxelSize();
         BodyTransform transform = *this;
         transform.scale /= edge;
         transform.linear *= 1 / edge;

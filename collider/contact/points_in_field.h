@@ -112,7 +112,7 @@ class PointsInField {
 
     // Min distance at which points can be rejected [coarse cells].
     float minRejectedDistance(float distance) const {
-        return (distance / field().voxelSize() + maxInterpolationError) / float(Clearance::partSide);
+        return (distance / field().voxelSize() + maxInterpolationError) / float(Clearance::cellSide);
     }
 
     // @param kept  float (centre, radius): max distance of points in a sphere that may matter [coarse cells]

@@ -30,9 +30,9 @@ float maxSmoothEdgeAngle(std::span<const Triangle> triangles) {
 
 // The normal of an edge is the mean of two unit normals: half the angle away from each.
 float smoothEdgeAngleAt(const MeshTree& tree, const glm::vec3& point) {
-    const std::uint32_t part = tree.nearestPart(glm::dvec3(point), nearby);
-    if (part == MeshTree::noPart) return 0;
-    const std::uint32_t triangle = tree.featureOfPart(part, glm::dvec3(point)).triangle;
+    const std::uint32_t piece = tree.nearestPiece(glm::dvec3(point), nearby);
+    if (piece == MeshTree::noPiece) return 0;
+    const std::uint32_t triangle = tree.featureOfPiece(piece, glm::dvec3(point)).triangle;
     const Mesh& mesh = tree.mesh();
     const glm::uvec3 corners = mesh.triangles[triangle];
     const glm::dvec3 p[] = {mesh.points[corners.x], mesh.points[corners.y], mesh.points[corners.z]};

@@ -11,7 +11,7 @@ namespace bilayer::detail {
 namespace {
 
 constexpr int stride = FieldFrame::stride;
-constexpr int partSide = Clearance::partSide;
+constexpr int cellSide = Clearance::cellSide;
 
 // Minima and maxima of a quarter of a block, over x and y, by place along the last axis.
 struct Quarter {
@@ -26,8 +26,8 @@ struct Quarter {
             FourFloats low, high;
             std::memcpy(&low, from, sizeof low);
             high = low;
-            for (int x = 0; x <= partSide; ++x)
-                for (int y = 0; y <= partSide; ++y) {
+            for (int x = 0; x <= cellSide; ++x)
+                for (int y = 0; y <= cellSide; ++y) {
                     FourFloats values;
                     std::memcpy(&values, from + (x * stride + y) * stride, sizeof values);
                     low = values < low ? values : low;
@@ -50,15 +50,15 @@ bool needsBlock(const openvdb::FloatTree::LeafNodeType& leaf) {
 
 BlockSummary summaryOf(const float* block, float voxelSize) {
     BlockSummary summary;
-    for (int i = 0; i < Clearance::blockParts; i += Clearance::perBlock) {
-        const Quarter quarter(block + partSide * stride * ((i >> 2) * stride + (i >> 1 & 1)));
-        for (int part = 0; part < Clearance::perBlock; ++part) {
-            const int first = part * partSide;
-            const float lowest = *std::min_element(&quarter.lowest[first], &quarter.lowest[first] + partSide + 1),
-                        highest = *std::max_element(&quarter.highest[first], &quarter.highest[first] + partSide + 1);
-            summary.lowest[i + part] = lowest;
+    for (int i = 0; i < Clearance::blockCells; i += Clearance::perBlock) {
+        const Quarter quarter(block + cellSide * stride * ((i >> 2) * stride + (i >> 1 & 1)));
+        for (int cell = 0; cell < Clearance::perBlock; ++cell) {
+            const int first = cell * cellSide;
+            const float lowest = *std::min_element(&quarter.lowest[first], &quarter.lowest[first] + cellSide + 1),
+                        highest = *std::max_element(&quarter.highest[first], &quarter.highest[first] + cellSide + 1);
+            summary.lowest[i + cell] = lowest;
             const bool isNear = std::min(std::abs(lowest), std::abs(highest)) <= nearSurface * voxelSize;
-            if (isNear || (lowest < 0) != (highest < 0)) summary.meetsSurface |= std::uint32_t(1) << (i + part);
+            if (isNear || (lowest < 0) != (highest < 0)) summary.meetsSurface |= std::uint32_t(1) << (i + cell);
         }
     }
     return summary;

@@ -18,7 +18,7 @@ inline constexpr float nearSurface = 0.5f * cellDiagonal;
 
 /// Summary of a block's coarse cells.
 struct BlockSummary {
-    std::array<float, Clearance::blockParts> lowest{};  ///< min value of the voxels around each coarse cell [m]
+    std::array<float, Clearance::blockCells> lowest{};  ///< min value of the voxels around each coarse cell [m]
     /// Bit k: a voxel of coarse cell k is close enough to the surface, or both signs occur.
     std::uint32_t meetsSurface = 0;
 };

@@ -14,12 +14,12 @@
 namespace bilayer::detail {
 
 /// Fast conservative tests for places far from the surface. It is a view of a field's coarse cells, which take little
-/// memory. A coarse cell ("part") has 4^3 voxels. Coordinates are in coarse cells from the field's origin.
+/// memory. A coarse cell has 4^3 voxels. Coordinates are in coarse cells from the field's origin.
 class Clearance {
   public:
-    static constexpr int partSide = 4;  ///< [voxels]
+    static constexpr int cellSide = 4;  ///< [voxels]
     static constexpr int perBlock = 2;  ///< coarse cells along a block
-    static constexpr int blockParts = perBlock * perBlock * perBlock;
+    static constexpr int blockCells = perBlock * perBlock * perBlock;
     static constexpr int steps = 8;               ///< per edge of a coarse cell: the unit of stored distances
     static constexpr int maxDistanceSteps = 127;  ///< stored distances are clamped to this [steps]
 
@@ -38,26 +38,26 @@ class Clearance {
 
     /// A lower bound of the distance to the surface; not positive where it is unknown [coarse cells].
     float around(const glm::dvec3& point) const noexcept {
-        const glm::ivec3 part = partOf(point);
-        return std::abs(centreOf(part)) - float(glm::distance(point, glm::dvec3(part) + 0.5));
+        const glm::ivec3 cell = cellOf(point);
+        return std::abs(centreOf(cell)) - float(glm::distance(point, glm::dvec3(cell) + 0.5));
     }
 
     /// Whether a sphere certainly lies outside the surface. False for a non-finite centre.
     bool isOutside(const glm::vec3& centre, float radius) const noexcept {
         const glm::vec3 toBox = centre - clamped(centre);
         if (glm::dot(toBox, toBox) > radius * radius) return true;
-        const glm::ivec3 part = partOf(centre);
-        const glm::vec3 offset = centre - (glm::vec3(part) + 0.5f);
-        const float left = centreOf(part) - radius;
+        const glm::ivec3 cell = cellOf(centre);
+        const glm::vec3 offset = centre - (glm::vec3(cell) + 0.5f);
+        const float left = centreOf(cell) - radius;
         return left > 0 && glm::dot(offset, offset) < left * left;
     }
 
     /// Whether a sample there is certainly above `reach` [m], or outside the band.
     bool isAbove(const glm::vec3& point, float reach) const noexcept {
-        const glm::ivec3 part = partOf(point);
-        const std::int32_t block = data_.directory[entryOf(part)];
+        const glm::ivec3 cell = cellOf(point);
+        const std::int32_t block = data_.directory[entryOf(cell)];
         if (block < 0) return data_.ofEmptyBlocks[-1 - block] > reach;
-        return float(data_.minima[std::size_t(block) * blockParts + inBlock(part)]) * data_.minimaStep > reach;
+        return float(data_.minima[std::size_t(block) * blockCells + inBlock(cell)]) * data_.minimaStep > reach;
     }
 
   private:
@@ -69,18 +69,18 @@ class Clearance {
                 std::min(std::max(Real(0), p.z), Real(extent_.z))};
     }
     template <class Point>
-    glm::ivec3 partOf(const Point& point) const noexcept {
+    glm::ivec3 cellOf(const Point& point) const noexcept {
         return glm::min(glm::ivec3(clamped(point)), size_ - 1);
     }
-    std::size_t entryOf(const glm::ivec3& part) const noexcept {
-        const glm::ivec3 block = part >> 1;
+    std::size_t entryOf(const glm::ivec3& cell) const noexcept {
+        const glm::ivec3 block = cell >> 1;
         return (std::size_t(block.x) * data_.blocks.y + block.y) * data_.blocks.z + block.z;
     }
-    static std::size_t inBlock(const glm::ivec3& part) noexcept {
-        return std::size_t((part.x & 1) << 2 | (part.y & 1) << 1 | (part.z & 1));
+    static std::size_t inBlock(const glm::ivec3& cell) noexcept {
+        return std::size_t((cell.x & 1) << 2 | (cell.y & 1) << 1 | (cell.z & 1));
     }
-    float centreOf(const glm::ivec3& part) const noexcept {
-        return float(data_.centres[entryOf(part) * blockParts + inBlock(part)]) * (1.f / steps);
+    float centreOf(const glm::ivec3& cell) const noexcept {
+        return float(data_.centres[entryOf(cell) * blockCells + inBlock(cell)]) * (1.f / steps);
     }
 
     Data data_;

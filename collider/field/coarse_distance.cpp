@@ -19,14 +19,14 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr int perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
-constexpr int maxParts = 16;  // distance limit of the bounds [coarse cells]
-static_assert(maxParts <= perBlock * clearanceReach);
+constexpr int perBlock = Clearance::perBlock, blockCells = Clearance::blockCells;
+constexpr int maxCells = 16;  // distance limit of the bounds [coarse cells]
+static_assert(maxCells <= perBlock * clearanceReach);
 
 // Squared distances from the centres of coarse cells to the nearest one that the surface meets. The unit is half a
 // coarse cell, so that distances to faces are integers.
 using SquaredSteps = std::int16_t;
-constexpr SquaredSteps farAway = 4 * maxParts * maxParts;
+constexpr SquaredSteps farAway = 4 * maxCells * maxCells;
 
 // The increase of a squared distance to the near face of a coarse cell `d` places away.
 constexpr SquaredSteps squaredStepsTo(int d) {
@@ -47,7 +47,7 @@ bool lower(SquaredSteps* squares, const SquaredSteps* others, std::size_t count,
 // Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the faces of coarse cells).
 void transformRow(SquaredSteps* squares, int length, std::vector<SquaredSteps>& before) {
     before.assign(squares, squares + length);
-    for (int d = 1; d <= std::min(maxParts, length - 1); ++d) {
+    for (int d = 1; d <= std::min(maxCells, length - 1); ++d) {
         const std::size_t count = length - d;
         const bool up = lower(squares + d, before.data(), count, squaredStepsTo(d));
         const bool down = lower(squares, before.data() + d, count, squaredStepsTo(d));
@@ -62,7 +62,7 @@ void transformRows(SquaredSteps* squares, std::size_t count, std::size_t step, i
     for (int i = 0; i < length; ++i) std::copy_n(squares + i * step, count, before.data() + i * count);
     for (int i = 0; i < length; ++i) {
         bool more = true;
-        for (int d = 1; more && d <= maxParts; ++d) {
+        for (int d = 1; more && d <= maxCells; ++d) {
             more = false;
             if (i >= d) more |= lower(squares + i * step, before.data() + (i - d) * count, count, squaredStepsTo(d));
             if (i + d < length)
@@ -89,12 +89,12 @@ void transform(LargeArray<SquaredSteps>& squares, const glm::ivec3& size) {
 // The coarse cells of a box of blocks.
 struct Cells {
     glm::ivec3 size;                             // along each axis
-    std::array<std::size_t, blockParts> next{};  // offsets of a block's cells from its first
+    std::array<std::size_t, blockCells> next{};  // offsets of a block's cells from its first
     LargeArray<SquaredSteps> squares;
 
     explicit Cells(const glm::ivec3& blocks)
         : size(perBlock * blocks), squares(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z)) {
-        for (int k = 0; k < blockParts; ++k) next[std::size_t(k)] = indexOf({k >> 2, k >> 1 & 1, k & 1});
+        for (int k = 0; k < blockCells; ++k) next[std::size_t(k)] = indexOf({k >> 2, k >> 1 & 1, k & 1});
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, squares.size()), [&](const auto& range) {
             std::fill(squares.data() + range.begin(), squares.data() + range.end(), farAway);
         });
@@ -107,7 +107,7 @@ struct Cells {
 
     void enter(const SurfaceBlock& block, const glm::ivec3& place) {
         const std::size_t cell = indexOf(perBlock * place);
-        for (int k = 0; k < blockParts; ++k)
+        for (int k = 0; k < blockCells; ++k)
             if (block.meets >> k & 1) squares[cell + next[std::size_t(k)]] = 0;
     }
 };
@@ -124,7 +124,7 @@ std::array<std::int8_t, farAway + 1> rootsOfSquares() {
 }  // namespace
 
 void measureClearances(FieldLayout& field, const glm::ivec3& first, std::span<const SurfaceBlock> surface, int margin) {
-    field.centres = LargeArray<std::int8_t>(field.entries() * blockParts);
+    field.centres = LargeArray<std::int8_t>(field.entries() * blockCells);
     if (!field.findsSurface()) {
         std::fill_n(field.centres.data(), field.centres.size(), std::int8_t(0));
         return;
@@ -146,10 +146,10 @@ void measureClearances(FieldLayout& field, const glm::ivec3& first, std::span<co
                 const std::size_t cell = cells.indexOf(perBlock * (glm::ivec3(x, y, z) + margin));
                 const std::int32_t block = field.directory[entry];
                 const bool emptyInside = block == FieldLayout::emptyInside;
-                for (std::size_t k = 0; k < blockParts; ++k) {
+                for (std::size_t k = 0; k < blockCells; ++k) {
                     const std::int8_t root = roots[std::size_t(cells.squares[cell + cells.next[k]])];
-                    const bool inside = block < 0 ? emptyInside : field.minima[std::size_t(block) * blockParts + k] < 0;
-                    field.centres[entry * blockParts + k] = std::int8_t(inside ? -root : root);
+                    const bool inside = block < 0 ? emptyInside : field.minima[std::size_t(block) * blockCells + k] < 0;
+                    field.centres[entry * blockCells + k] = std::int8_t(inside ? -root : root);
                 }
             }
     });

@@ -181,11 +181,11 @@ bool FieldData::isBehind(const NearestFeature& nearest, const Side& side, const 
     return byNormal ? height < 0 : side.inside;
 }
 
-// The result for a point, from the closest part of the mesh.
-ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, float maxDistance) const {
-    if (part == MeshTree::noPart) return {};
+// The result for a point, from the closest piece of the mesh.
+ClosestPoint FieldData::closestOn(std::uint32_t piece, const glm::vec3& point, float maxDistance) const {
+    if (piece == MeshTree::noPiece) return {};
     const glm::dvec3 from = mesh->approached(glm::dvec3(point));
-    const NearestFeature nearest = mesh->featureOfPart(part, from);
+    const NearestFeature nearest = mesh->featureOfPiece(piece, from);
     const double distance = glm::length(nearest.offset + (from - glm::dvec3(point)));
     if (!(distance <= double(maxDistance))) return {};
     const bool inside = isInside(nearest, point);
@@ -204,11 +204,11 @@ float FieldData::boundOf(float maxDistance) const {
 }
 
 // Searches the whole mesh if the search from an entry has found nothing and its reach is too short.
-std::uint32_t FieldData::orBeyond(std::uint32_t part, const EntryPlace& place, const glm::vec3& point,
+std::uint32_t FieldData::orBeyond(std::uint32_t piece, const EntryPlace& place, const glm::vec3& point,
                                   float maxDistance) const {
     const float bound = boundOf(maxDistance);
-    if (part != MeshTree::noPart || (place.entries && bound <= entries.reach())) return part;
-    return mesh->nearestPart(glm::dvec3(point), bound);
+    if (piece != MeshTree::noPiece || (place.entries && bound <= entries.reach())) return piece;
+    return mesh->nearestPiece(glm::dvec3(point), bound);
 }
 
 ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const {
@@ -217,10 +217,10 @@ ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const
     const glm::dvec3 local = toLocal(point);
     fetchSide(local);
     const EntryPlace place = entries.at(local);
-    std::uint32_t part = MeshTree::noPart;
+    std::uint32_t piece = MeshTree::noPiece;
     if (place.entries)
-        part = mesh->nearestPart(glm::dvec3(point), std::min(boundOf(maxDistance), entries.reach()), place);
-    return closestOn(orBeyond(part, place, point, maxDistance), point, maxDistance);
+        piece = mesh->nearestPiece(glm::dvec3(point), std::min(boundOf(maxDistance), entries.reach()), place);
+    return closestOn(orBeyond(piece, place, point, maxDistance), point, maxDistance);
 }
 
 ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noexcept {
@@ -235,7 +235,7 @@ void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> a
         return;
     }
     std::array<EntryPlace, batch> places;
-    std::array<std::uint32_t, batch> parts;
+    std::array<std::uint32_t, batch> pieces;
     const float bound = std::min(data_->boundOf(maxDistance), data_->entries.reach());
     for (std::size_t begin = 0; begin < points.size(); begin += batch) {
         const std::span<const glm::vec3> some = points.subspan(begin, std::min(batch, points.size() - begin));
@@ -245,10 +245,10 @@ void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> a
             places[i].fetch();
             data_->fetchSide(local);
         }
-        data_->mesh->nearestParts(some, bound, {places.data(), some.size()}, {parts.data(), some.size()});
+        data_->mesh->nearestPieces(some, bound, {places.data(), some.size()}, {pieces.data(), some.size()});
         for (std::size_t i = 0; i < some.size(); ++i)
             answers[begin + i] =
-                data_->closestOn(data_->orBeyond(parts[i], places[i], some[i], maxDistance), some[i], maxDistance);
+                data_->closestOn(data_->orBeyond(pieces[i], places[i], some[i], maxDistance), some[i], maxDistance);
     }
 }
 

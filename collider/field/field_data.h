@@ -33,10 +33,10 @@ using Ints [[gnu::vector_size(16)]] = std::int32_t;
 
 struct FieldData;
 
-/// A point of a part of a field.
-struct PartPoint {
+/// A point in a tile of a field.
+struct TilePoint {
     glm::vec3 point;   ///< in field coordinates [m]
-    glm::dvec3 local;  ///< from the part's first voxel, rounded as in the whole field [voxels]
+    glm::dvec3 local;  ///< from the tile's first voxel, rounded as in the whole field [voxels]
 };
 
 /// Sampling functions for one instruction set and one storage. The gradient is computed where the distance is at most
@@ -45,7 +45,7 @@ struct SampleKernels {
     Sample (*sampleAt)(const FieldData&, const glm::dvec3& local, float gradientReach) noexcept;
     Sample (*samplePoint)(const FieldData&, const glm::vec3& point) noexcept;
     Sample (*sampleWithin)(const FieldData&, const glm::vec3& point, float gradientReach) noexcept;
-    Sample (*sampleInPart)(const FieldData&, const PartPoint& point) noexcept;
+    Sample (*sampleInTile)(const FieldData&, const TilePoint& point) noexcept;
     Floats (*sampleInBand)(const FieldData&, LastBlock&, const glm::vec3& point) noexcept;  ///< of FieldSampler
     void (*sampleMany)(const FieldData&, std::span<const glm::vec3> points, Sample*) noexcept;
 };
@@ -55,7 +55,7 @@ const SampleKernels& sampleKernels(Storage storage);
 
 struct FieldData : FieldLayout {
     FieldData(const LevelSet& levelSet, Storage storage);
-    /// Of a part of a field, for samples alone.
+    /// Of a tile of a field, for samples alone.
     explicit FieldData(FieldLayout layout);
     /// Shares the samples.
     FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outward);
@@ -101,7 +101,7 @@ struct FieldData : FieldLayout {
 
     /// A lower bound of the distance to the surface; not positive where it is unknown [voxels].
     float clearanceAt(const glm::dvec3& local) const {
-        return float(Clearance::partSide) * coarse.around(local / double(Clearance::partSide));
+        return float(Clearance::cellSide) * coarse.around(local / double(Clearance::cellSide));
     }
 
     /// The field's answer to the side of a point.
@@ -122,9 +122,9 @@ struct FieldData : FieldLayout {
     bool isBehind(const NearestFeature& nearest, const Side& side, const glm::vec3& point) const;
     bool isInside(const NearestFeature& nearest, const glm::vec3& point) const;
     float boundOf(float maxDistance) const;
-    std::uint32_t orBeyond(std::uint32_t part, const EntryPlace& place, const glm::vec3& point,
+    std::uint32_t orBeyond(std::uint32_t piece, const EntryPlace& place, const glm::vec3& point,
                            float maxDistance) const;
-    ClosestPoint closestOn(std::uint32_t part, const glm::vec3& point, float maxDistance) const;
+    ClosestPoint closestOn(std::uint32_t piece, const glm::vec3& point, float maxDistance) const;
 
     /// The closest point of the mesh, or of the zero set if there is no mesh.
     ClosestPoint closest(const glm::vec3& point, float maxDistance) const;

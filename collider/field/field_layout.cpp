@@ -30,7 +30,7 @@ using Accessor = openvdb::FloatGrid::ConstAccessor;
 
 constexpr int side = FieldLayout::side;
 constexpr std::int64_t maxBlocks = 1 << 26;        // of the box: 0.75 GiB at 12 bytes each
-constexpr std::int64_t maxBlocksAround = 1 << 27;  // of a part with those around it: 2 GiB for a moment, 16 bytes each
+constexpr std::int64_t maxBlocksAround = 1 << 27;  // of a tile with those around it: 2 GiB for a moment, 16 bytes each
 constexpr int minSteps = 126;                      // from 0 to the end of the band, for the stored minima
 
 [[noreturn]] void throwTooLong() {
@@ -96,7 +96,7 @@ std::vector<SurfaceBlock> enterBlocks(FieldLayout& field, const FloatTree& tree,
         field.values = LargeArray<float>(floats);
     else
         field.values16 = LargeArray<std::int16_t>(floats);
-    field.minima = LargeArray<std::int8_t>(field.stored * Clearance::blockParts);
+    field.minima = LargeArray<std::int8_t>(field.stored * Clearance::blockCells);
     std::vector<SurfaceBlock> surface(field.stored);
     const float minimaStep = minimaStepOf(field);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, field.stored), [&](const auto& range) {
@@ -112,8 +112,8 @@ std::vector<SurfaceBlock> enterBlocks(FieldLayout& field, const FloatTree& tree,
                 store(block.data(), field, field.step, field.values16.data() + i * FieldLayout::blockFloats);
             const BlockSummary summary = summaryOf(block.data(), field.voxelSize);
             surface[i] = {{origins[i].x(), origins[i].y(), origins[i].z()}, summary.meetsSurface};
-            for (int k = 0; k < Clearance::blockParts; ++k)
-                field.minima[i * Clearance::blockParts + k] =
+            for (int k = 0; k < Clearance::blockCells; ++k)
+                field.minima[i * Clearance::blockCells + k] =
                     std::int8_t(std::clamp(std::floor(summary.lowest[k] / minimaStep), -127.f, 127.f));
         }
     });
@@ -155,7 +155,7 @@ void FieldFrame::requireSize() const {
     requireLength();
 }
 
-void FieldFrame::requireSizeOfPart() const {
+void FieldFrame::requireSizeOfTile() const {
     requireSize();
     if (findsSurface() && count(blocks + 2 * clearanceReach) > double(maxBlocksAround))
         throw std::invalid_argument(fmt::format(
@@ -196,16 +196,16 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
     bounds = {glm::vec3(placeOf(grid, active.min())), glm::vec3(placeOf(grid, active.max()))};
 }
 
-FieldLayout::FieldLayout(const FieldFrame& frame, const Grids& grids, const LayoutPart& part, Storage storage)
+FieldLayout::FieldLayout(const FieldFrame& frame, const Grids& grids, const LayoutTile& tile, Storage storage)
     : FieldLayout(frame, storage) {
-    blocks = part.blocks;
-    requireSizeOfPart();
-    const Coord first(part.first.x, part.first.y, part.first.z);
+    blocks = tile.blocks;
+    requireSizeOfTile();
+    const Coord first(tile.first.x, tile.first.y, tile.first.z);
     const auto box =
         openvdb::CoordBBox(first, first + Coord(side * blocks.x - 1, side * blocks.y - 1, side * blocks.z - 1));
     const openvdb::FloatGrid& grid = *grids.distance;
     enter(*this, grid, storedBlocks(grid.tree(), box), first);
-    measureClearances(*this, part.first, part.surface, clearanceReach);
+    measureClearances(*this, tile.first, tile.surface, clearanceReach);
 }
 
 FieldLayout::FieldLayout(const FieldFrame& frame, Storage storage)

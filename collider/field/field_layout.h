@@ -50,15 +50,15 @@ struct FieldFrame {
     static constexpr int maxBlocksAlong = 1 << 19;
     /// Throws std::invalid_argument if the directory has more than 2^26 entries, or more than 2^19 along an axis.
     void requireSize() const;
-    /// The same for a part of a field, and if it has more than 2^27 blocks with those within clearanceReach around it.
-    void requireSizeOfPart() const;
+    /// The same for a tile of a field, and if it has more than 2^27 blocks with those within clearanceReach around it.
+    void requireSizeOfTile() const;
     /// Throws std::invalid_argument if the directory has more than 2^19 entries along an axis.
     void requireLength() const;
 
     /// Whether the band is wide enough to locate the surface.
     bool findsSurface() const;
 
-    glm::ivec3 parts() const { return Clearance::perBlock * blocks; }
+    glm::ivec3 coarseCells() const { return Clearance::perBlock * blocks; }
 };
 
 /// A block that stores samples of the band.
@@ -68,9 +68,9 @@ struct SurfaceBlock {
 };
 
 /// A box of blocks of a larger field.
-struct LayoutPart {
+struct LayoutTile {
     glm::ivec3 first, blocks;  ///< the first voxel, and the count of blocks along each axis
-    /// Blocks of the whole field: all of the part's own, and all others within clearanceReach of the box.
+    /// Blocks of the whole field: all of the tile's own, and all others within clearanceReach of the box.
     std::span<const SurfaceBlock> surface;
 };
 
@@ -95,10 +95,10 @@ struct FieldLayout : FieldFrame {
     /// Throws std::invalid_argument if no voxel is in the band, if the box holds more than 2^26 blocks of 8^3 voxels,
     /// or if it holds more than 2^19 along an axis.
     explicit FieldLayout(const LevelSet& levelSet, Storage storage = Storage::float32);
-    /// Lays out a part of a field. Its samples and bounds are those of the whole field.
+    /// Lays out a tile of a field. Its samples and bounds are those of the whole field.
     /// @param frame  of the whole field
-    /// @param grids  with all voxels of the part, and the next ones above it
-    FieldLayout(const FieldFrame& frame, const Grids& grids, const LayoutPart& part, Storage storage);
+    /// @param grids  with all voxels of the tile, and the next ones above it
+    FieldLayout(const FieldFrame& frame, const Grids& grids, const LayoutTile& tile, Storage storage);
     FieldLayout(FieldLayout&&) noexcept = default;
     FieldLayout& operator=(FieldLayout&&) noexcept = default;
 

@@ -66,14 +66,14 @@ std::optional<RayHit> touchMesh(const FieldData& field, const Path& path, double
 
 std::optional<RayHit> touchZero(const FieldData& field, const Path& path, double radius) {
     const double reach = radius * field.perMetre;
-    const auto part = partIn(toLocal(field, path), glm::dvec3(-reach), field.extent() + reach);
-    if (!part) return std::nullopt;
-    auto touch = firstZeroTouch(field, part->path, reach);
+    const auto section = sectionIn(toLocal(field, path), glm::dvec3(-reach), field.extent() + reach);
+    if (!section) return std::nullopt;
+    auto touch = firstZeroTouch(field, section->path, reach);
     if (!touch) return std::nullopt;
-    const glm::dvec3 centre = part->path.at(touch->along), from = approachedPoint(field, centre);
+    const glm::dvec3 centre = section->path.at(touch->along), from = approachedPoint(field, centre);
     // from so far away several zeros may be equally near: take the nearest one
     if (from != centre) touch->position = nearestZero(field, from, std::numeric_limits<double>::infinity()).value();
-    return RayHit{.distance = toFloat((part->from + touch->along) * field.voxel),
+    return RayHit{.distance = toFloat((section->from + touch->along) * field.voxel),
                   .position = field.toWorld(touch->position),
                   .normal = glm::vec3(glm::normalize(centre - touch->position))};
 }

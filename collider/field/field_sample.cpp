@@ -47,10 +47,10 @@ HWY_INLINE glm::dvec3 localOf(const FieldData& field, const glm::vec3& point) {
 HWY_INLINE glm::dvec3 localOf(const FieldData&, const glm::dvec3& local) {
     return local;
 }
-HWY_INLINE glm::dvec3 localOf(const FieldData&, const PartPoint& point) {
+HWY_INLINE glm::dvec3 localOf(const FieldData&, const TilePoint& point) {
     return point.local;
 }
-HWY_INLINE FixedNumbers numbersOf(const FieldData& field, const PartPoint& point) {
+HWY_INLINE FixedNumbers numbersOf(const FieldData& field, const TilePoint& point) {
     return numbersOf(field, point.point);
 }
 
@@ -276,7 +276,7 @@ void sampleMany(const FieldData& field, std::span<const glm::vec3> points, Sampl
 template <class Value>
 constexpr SampleKernels kernelsOf{
     sampleWithin<Value, glm::dvec3>, samplePoint<Value, glm::vec3>, sampleWithin<Value, glm::vec3>,
-    samplePoint<Value, PartPoint>,   sampleInBand<Value>,           sampleMany<Value>};
+    samplePoint<Value, TilePoint>,   sampleInBand<Value>,           sampleMany<Value>};
 
 const SampleKernels& kernels(Storage storage) {
     return storage == Storage::float32 ? kernelsOf<float> : kernelsOf<std::int16_t>;

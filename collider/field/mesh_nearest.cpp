@@ -49,7 +49,7 @@ class NearestSearch {
         point_ = SplitPoint(point);
         const float reach = std::min(bound, maxReach);
         best2_ = reach * reach;
-        part_ = MeshTree::noPart;
+        piece_ = MeshTree::noPiece;
     }
 
     // Visits a node, and all nodes below it that may contain a nearer triangle.
@@ -68,7 +68,7 @@ class NearestSearch {
     }
 
     float best2() const { return best2_; }  // squared distance of the nearest triangle, or the squared bound [voxels]
-    std::uint32_t part() const { return part_; }
+    std::uint32_t piece() const { return piece_; }
 
   private:
     void descendFrom(std::uint32_t node) {
@@ -141,8 +141,8 @@ class NearestSearch {
             found |= bitsOf(hn::Eq(hn::Load(tag, distance2 + i), nearest)) << i;
         const float nearest2 = hn::GetLane(nearest);
         // the bound itself is included
-        const bool nearer = part_ == MeshTree::noPart ? nearest2 <= best2_ : nearest2 < best2_;
-        part_ = nearer ? index * treeWidth + std::uint32_t(std::countr_zero(found)) : part_;
+        const bool nearer = piece_ == MeshTree::noPiece ? nearest2 <= best2_ : nearest2 < best2_;
+        piece_ = nearer ? index * treeWidth + std::uint32_t(std::countr_zero(found)) : piece_;
         best2_ = nearer ? nearest2 : best2_;
     }
 
@@ -150,7 +150,7 @@ class NearestSearch {
     const OrientedBoxes* groups_;
     SplitPoint point_;
     float best2_;
-    std::uint32_t part_;
+    std::uint32_t piece_;
 };
 
 // The search for one point from a cube's entries. A key holds the squared gap of a node's box, with the entry and slot
@@ -176,7 +176,7 @@ class EntrySearch {
         choose();
     }
 
-    std::uint32_t part() const { return search_.part(); }
+    std::uint32_t piece() const { return search_.piece(); }
 
   private:
     using Ints = hn::CappedTag<std::int32_t, treeWidth>;
@@ -242,7 +242,7 @@ std::uint32_t searchAll(const WideTree& tree, const OrientedBoxes* groups, const
     NearestSearch search;
     search.begin(tree, groups, point, bound);
     search.visit(tree.root());
-    return search.part();
+    return search.piece();
 }
 
 std::uint32_t searchEntry(const WideTree& tree, const OrientedBoxes* groups, const glm::dvec3& point, float bound,
@@ -250,13 +250,13 @@ std::uint32_t searchEntry(const WideTree& tree, const OrientedBoxes* groups, con
     EntrySearch search;
     search.begin(tree, groups, point, bound, place);
     while (search.chosen()) search.visitChosen();
-    return search.part();
+    return search.piece();
 }
 
 // Interleaves the searches of several points, so that prefetches are well ahead of their use.
 void searchEntries(const WideTree& tree, const OrientedBoxes* groups, double perMetre,
                    std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
-                   std::span<std::uint32_t> parts) {
+                   std::span<std::uint32_t> pieces) {
     EntrySearch searches[together];
     for (std::size_t first = 0; first < points.size(); first += together) {
         const std::size_t count = std::min(together, points.size() - first);
@@ -269,7 +269,7 @@ void searchEntries(const WideTree& tree, const OrientedBoxes* groups, double per
                 if (searches[i].chosen()) searches[i].visitChosen();
         for (std::size_t i = 0; i < count; ++i) {
             while (searches[i].chosen()) searches[i].visitChosen();
-            parts[first + i] = searches[i].part();
+            pieces[first + i] = searches[i].piece();
         }
     }
 }
@@ -285,26 +285,26 @@ HWY_EXPORT(searchAll);
 HWY_EXPORT(searchEntry);
 HWY_EXPORT(searchEntries);
 
-std::uint32_t MeshTree::nearestPart(const glm::dvec3& point, float bound) const noexcept {
+std::uint32_t MeshTree::nearestPiece(const glm::dvec3& point, float bound) const noexcept {
     const glm::dvec3 from = approached(point);
     const double closer = glm::distance(point, from);
-    if (!std::isfinite(closer) || !(double(bound) >= closer * perMetre_)) return noPart;
+    if (!std::isfinite(closer) || !(double(bound) >= closer * perMetre_)) return noPiece;
     const float left = from == point ? bound : std::numeric_limits<float>::infinity();
     return HWY_DYNAMIC_DISPATCH(searchAll)(tree_, groups_.data(), toTree(from), left);
 }
 
 std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noexcept {
-    const std::uint32_t part = nearestPart(point, bound);
-    return part == noPart ? noTriangle : triangleOf(part);
+    const std::uint32_t piece = nearestPiece(point, bound);
+    return piece == noPiece ? noTriangle : triangleOf(piece);
 }
 
-std::uint32_t MeshTree::nearestPart(const glm::dvec3& point, float bound, const EntryPlace& place) const noexcept {
+std::uint32_t MeshTree::nearestPiece(const glm::dvec3& point, float bound, const EntryPlace& place) const noexcept {
     return HWY_DYNAMIC_DISPATCH(searchEntry)(tree_, groups_.data(), toTree(point), bound, place);
 }
 
-void MeshTree::nearestParts(std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
-                            std::span<std::uint32_t> parts) const noexcept {
-    HWY_DYNAMIC_DISPATCH(searchEntries)(tree_, groups_.data(), perMetre_, points, bound, places, parts);
+void MeshTree::nearestPieces(std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
+                             std::span<std::uint32_t> pieces) const noexcept {
+    HWY_DYNAMIC_DISPATCH(searchEntries)(tree_, groups_.data(), perMetre_, points, bound, places, pieces);
 }
 
 }  // namespace bilayer::detail

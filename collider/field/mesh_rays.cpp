@@ -42,10 +42,10 @@ HWY_EXPORT(searchRay);
 std::optional<MeshHit> firstHit(const MeshTree& mesh, const Path& path) noexcept {
     // starts near the mesh, where single precision is sufficient
     const auto [lower, upper] = mesh.box();
-    const auto part = partIn(path, lower, upper);
-    if (!part) return std::nullopt;
-    auto hit = HWY_DYNAMIC_DISPATCH(searchRay)(mesh, part->path);
-    if (hit) hit->along += part->from;
+    const auto section = sectionIn(path, lower, upper);
+    if (!section) return std::nullopt;
+    auto hit = HWY_DYNAMIC_DISPATCH(searchRay)(mesh, section->path);
+    if (hit) hit->along += section->from;
     return hit;
 }
 

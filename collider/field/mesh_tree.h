@@ -59,23 +59,23 @@ class MeshTree {
     /// @param bound  [voxels], may be infinite
     std::uint32_t nearest(const glm::dvec3& point, float bound) const noexcept;
 
-    /// The same, but returns the place in the tree: a triangle, or a part of a long one. `noPart` if there is none.
-    static constexpr std::uint32_t noPart = ~0u;
-    std::uint32_t nearestPart(const glm::dvec3& point, float bound) const noexcept;
+    /// The same, but returns the place in the tree: a triangle, or a piece of a long one. `noPiece` if there is none.
+    static constexpr std::uint32_t noPiece = ~0u;
+    std::uint32_t nearestPiece(const glm::dvec3& point, float bound) const noexcept;
 
     /// The same, starting at an entry. The bound must not exceed the entry's reach.
-    std::uint32_t nearestPart(const glm::dvec3& point, float bound, const EntryPlace& place) const noexcept;
+    std::uint32_t nearestPiece(const glm::dvec3& point, float bound, const EntryPlace& place) const noexcept;
 
-    /// The same for many points, faster. All spans have the same length. `noPart` for points without an entry.
-    void nearestParts(std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
-                      std::span<std::uint32_t> parts) const noexcept;
+    /// The same for many points, faster. All spans have the same length. `noPiece` for points without an entry.
+    void nearestPieces(std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
+                       std::span<std::uint32_t> pieces) const noexcept;
 
     /// The feature of a triangle that is closest to a point [m], in double precision. For a point on the surface it is
     /// the one of lowest dimension: a vertex before an edge, an edge before a face.
     NearestFeature featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept;
 
-    /// The same for a part that nearestPart() has found for the point. Fast if the point projects into the triangle.
-    NearestFeature featureOfPart(std::uint32_t part, const glm::dvec3& point) const noexcept;
+    /// The same for a piece that nearestPiece() has found for the point. Fast if the point projects into the triangle.
+    NearestFeature featureOfPiece(std::uint32_t piece, const glm::dvec3& point) const noexcept;
 
     const Mesh& mesh() const { return *mesh_; }
     const WideTree& tree() const { return tree_; }
@@ -89,8 +89,8 @@ class MeshTree {
     void toEdge(NearestFeature& found, const std::array<glm::dvec3, 3>& corners) const noexcept;
     void toSmallest(NearestFeature& found, const std::array<glm::dvec3, 3>& corners, double room) const noexcept;
     glm::dvec3 toTree(const glm::dvec3& point) const { return point * perMetre_ - glm::dvec3(tree_.base); }
-    std::uint32_t triangleOf(std::uint32_t part) const {
-        return tree_.leaves[part / treeWidth].triangles[part % treeWidth];
+    std::uint32_t triangleOf(std::uint32_t piece) const {
+        return tree_.leaves[piece / treeWidth].triangles[piece % treeWidth];
     }
 
     std::shared_ptr<const Mesh> mesh_;

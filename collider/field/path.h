@@ -51,26 +51,26 @@ inline glm::dvec3 approached(const glm::dvec3& point, const glm::dvec3& lower, c
 }
 
 /// A section of a path, as a path of its own.
-struct PathPart {
+struct PathSection {
     Path path;
     double from;  ///< its start on the whole path
 };
 
 /// The section of a path inside a box. It starts in the box and ends there up to rounding, however far away the whole
 /// path starts. Lengths along it are therefore as accurate as the box is small.
-inline std::optional<PathPart> partIn(const Path& path, const glm::dvec3& lower, const glm::dvec3& upper) {
+inline std::optional<PathSection> sectionIn(const Path& path, const glm::dvec3& lower, const glm::dvec3& upper) {
     const auto whole = clip(path, lower, upper);
     if (!whole) return std::nullopt;
     const double from = whole->first;
-    Path part{glm::clamp(path.at(from), lower, upper), path.direction, path.length - from};
+    Path section{glm::clamp(path.at(from), lower, upper), path.direction, path.length - from};
     // places the start exactly on the entry face, despite rounding
     for (int k = 0; from > 0 && k < 3; ++k) {
         const double face = path.direction[k] > 0 ? lower[k] : upper[k];
-        if ((face - path.origin[k]) / path.direction[k] == from) part.origin[k] = face;
+        if ((face - path.origin[k]) / path.direction[k] == from) section.origin[k] = face;
     }
-    const auto within = clip(part, lower, upper);
-    part.length = within ? within->second : 0;
-    return PathPart{part, from};
+    const auto within = clip(section, lower, upper);
+    section.length = within ? within->second : 0;
+    return PathSection{section, from};
 }
 
 }  // namespace bilayer::detail

@@ -40,9 +40,9 @@ std::optional<SphereTouch> firstTouchOnPath(const MeshTree& mesh, const Path& pa
     constexpr double nearestSlack = 1e-4, nearestRounding = 2e-6;
 
     const auto [lower, upper] = mesh.box();
-    const auto part = partIn(path, lower - radius, upper + radius);
-    if (!part) return std::nullopt;
-    const double voxel = mesh.voxelSize(), length = part->path.length;
+    const auto section = sectionIn(path, lower - radius, upper + radius);
+    if (!section) return std::nullopt;
+    const double voxel = mesh.voxelSize(), length = section->path.length;
     const double piece = std::max(pieceLength * voxel, length / maxPieces), reach = lookAhead * piece;
     const auto freeDistance = [&](const glm::dvec3& centre) {
         const double known = clearanceAt(centre) - radius - nearestSlack * voxel;
@@ -53,12 +53,12 @@ std::optional<SphereTouch> firstTouchOnPath(const MeshTree& mesh, const Path& pa
         return distance * (1 - nearestRounding) - radius - nearestSlack * voxel;
     };
     for (double along = 0; along <= length;) {
-        const double free = freeDistance(part->path.at(along));
+        const double free = freeDistance(section->path.at(along));
         if (free > piece) {
             along += free;
             continue;
         }
-        const Path next{part->path.at(along), path.direction, std::min(piece, length - along)};
+        const Path next{section->path.at(along), path.direction, std::min(piece, length - along)};
         if (auto hit = firstTouch(mesh, next, radius)) {
             const glm::dvec3 centre = next.at(hit->along), from = mesh.approached(centre);
             // from so far away several triangles may be equally near: take the nearest one
@@ -66,8 +66,8 @@ std::optional<SphereTouch> firstTouchOnPath(const MeshTree& mesh, const Path& pa
                 hit->triangle = mesh.nearest(from, std::numeric_limits<float>::infinity());
                 hit->position = from + mesh.featureOf(hit->triangle, from).offset;
             }
-            return SphereTouch{part->from + along + hit->along, hit->position, glm::normalize(centre - hit->position),
-                               hit->triangle};
+            return SphereTouch{section->from + along + hit->along, hit->position,
+                               glm::normalize(centre - hit->position), hit->triangle};
         }
         along += piece;
     }

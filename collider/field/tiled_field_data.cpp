@@ -150,9 +150,9 @@ void TiledFieldData::placeTiles() {
 
 void TiledFieldData::requireSizes() const {
     for (const PlacedTile& placed : placed_) {
-        FieldFrame part = frame_;
-        part.blocks = placed.blocks;
-        part.requireSizeOfPart();
+        FieldFrame frame = frame_;
+        frame.blocks = placed.blocks;
+        frame.requireSizeOfTile();
     }
 }
 
@@ -182,7 +182,7 @@ Sample TiledFieldData::sample(const glm::vec3& point, std::optional<std::size_t>
 
 // In voxels, the step from the field's first voxel to the tile's is exact.
 Sample TiledFieldData::sampleIn(const FieldData& data, std::size_t tile, const glm::vec3& point) const {
-    return data.kernels.sampleInPart(data, {point, frame_.toLocal(point) - placed_[tile].shift});
+    return data.kernels.sampleInTile(data, {point, frame_.toLocal(point) - placed_[tile].shift});
 }
 
 // As FieldData::memoryBytes() will be, but for the rounding of allocations.
@@ -191,8 +191,8 @@ std::size_t TiledFieldData::bytesOf(std::size_t tile) const {
     const std::size_t entries =
         std::size_t(placed.blocks.x) * std::size_t(placed.blocks.y) * std::size_t(placed.blocks.z);
     const std::size_t value = storage_ == Storage::float32 ? sizeof(float) : sizeof(std::int16_t);
-    return sizeof(FieldData) + entries * (sizeof(std::int32_t) + Clearance::blockParts) +
-           (placed.surfaceEnd - placed.surface) * (FieldFrame::blockFloats * value + Clearance::blockParts);
+    return sizeof(FieldData) + entries * (sizeof(std::int32_t) + Clearance::blockCells) +
+           (placed.surfaceEnd - placed.surface) * (FieldFrame::blockFloats * value + Clearance::blockCells);
 }
 
 std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
@@ -210,8 +210,8 @@ std::shared_ptr<const FieldData> TiledFieldData::read(std::size_t tile) const {
         });
     }
     const std::vector<SurfaceBlock> surface = surfaceAround(placed_[tile]);
-    const LayoutPart part{placed_[tile].first, placed_[tile].blocks, surface};
-    return std::make_shared<const FieldData>(FieldLayout(frame_, grids, part, storage_));
+    const LayoutTile layout{placed_[tile].first, placed_[tile].blocks, surface};
+    return std::make_shared<const FieldData>(FieldLayout(frame_, grids, layout, storage_));
 }
 
 std::vector<SurfaceBlock> TiledFieldData::surfaceAround(const PlacedTile& tile) const {

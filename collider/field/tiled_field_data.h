@@ -21,7 +21,7 @@ namespace bilayer::detail {
 
 /// A tile's part of the directory, its own box, and its share of the surface blocks.
 struct PlacedTile {
-    glm::ivec3 first, blocks;         ///< as LayoutPart: the tile's blocks and, as far as there are any, those below
+    glm::ivec3 first, blocks;         ///< as LayoutTile: the tile's blocks and, as far as there are any, those below
     glm::dvec3 lower, upper;          ///< its own box within that of the field, from the field's first voxel [voxels]
     glm::dvec3 shift;                 ///< of `first` from the field's first voxel [voxels]
     std::size_t surface, surfaceEnd;  ///< range in the list of surface blocks

@@ -48,11 +48,11 @@ ClosestPoint closestZero(const FieldFrame& frame, const glm::vec3& point, float 
 /// @param first  (Path) -> std::optional<ZeroPoint>, as firstInside()
 template <class First>
 std::optional<RayHit> hitZero(const FieldFrame& frame, const Path& path, const First& first) {
-    const auto part = partIn(toLocal(frame, path), glm::dvec3(0), frame.extent());
-    if (!part) return std::nullopt;
-    const std::optional<ZeroPoint> hit = first(part->path);
+    const auto section = sectionIn(toLocal(frame, path), glm::dvec3(0), frame.extent());
+    if (!section) return std::nullopt;
+    const std::optional<ZeroPoint> hit = first(section->path);
     if (!hit) return std::nullopt;
-    return RayHit{.distance = toFloat((part->from + hit->along) * frame.voxel),
+    return RayHit{.distance = toFloat((section->from + hit->along) * frame.voxel),
                   .position = frame.toWorld(hit->position),
                   .normal = glm::vec3(hit->normal != glm::dvec3(0) ? hit->normal : -path.direction)};
 }

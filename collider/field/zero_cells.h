@@ -34,13 +34,13 @@ inline CornerValues cellValues(const FieldData& field, std::int32_t entry, const
 }
 
 /// The corners of a coarse cell's cells that are inside: a bit for each along z.
-using InsideRows = std::array<std::array<std::uint8_t, Clearance::partSide + 1>, Clearance::partSide + 1>;
+using InsideRows = std::array<std::array<std::uint8_t, Clearance::cellSide + 1>, Clearance::cellSide + 1>;
 
 inline InsideRows insideRows(const FieldData& field, std::int32_t entry, const glm::ivec3& inBlock) {
     InsideRows rows{};
-    for (int x = 0; x <= Clearance::partSide; ++x)
-        for (int y = 0; y <= Clearance::partSide; ++y)
-            for (int z = 0; z <= Clearance::partSide; ++z) {
+    for (int x = 0; x <= Clearance::cellSide; ++x)
+        for (int y = 0; y <= Clearance::cellSide; ++y)
+            for (int z = 0; z <= Clearance::cellSide; ++z) {
                 const glm::ivec3 at = inBlock + glm::ivec3(x, y, z);
                 const int index = (at.x * FieldFrame::stride + at.y) * FieldFrame::stride + at.z;
                 const float value = field.valueAt(std::size_t(entry) * FieldFrame::blockFloats + std::size_t(index));

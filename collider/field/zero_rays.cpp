@@ -24,9 +24,9 @@ constexpr double minCubeStride = 6;
 constexpr double crossingTolerance = 1e-9;
 
 // The side of a coarse cell without surface.
-bool isPartInside(const FieldData& field, std::int32_t entry, const glm::ivec3& part) {
+bool isCellInside(const FieldData& field, std::int32_t entry, const glm::ivec3& cell) {
     return entry < 0 ? entry == FieldFrame::emptyInside
-                     : cellValues(field, entry, Clearance::partSide * part & 7).front() < 0;
+                     : cellValues(field, entry, Clearance::cellSide * cell & 7).front() < 0;
 }
 
 // The cubic c[0] + c[1] t + c[2] t^2 + c[3] t^3.
@@ -145,11 +145,11 @@ class GridWalk {
 };
 
 // Searches one coarse cell of a stored block.
-std::optional<double> firstInsidePart(const FieldData& field, const Path& path, const glm::ivec3& part, double from,
+std::optional<double> firstInsideCell(const FieldData& field, const Path& path, const glm::ivec3& cell, double from,
                                       double to) {
-    const glm::ivec3 lower = Clearance::partSide * part;
+    const glm::ivec3 lower = Clearance::cellSide * cell;
     const std::int32_t entry = entryAt(field, lower);
-    for (GridWalk walk(path, 1, lower, lower + Clearance::partSide, from, to); walk.inside(); walk.step()) {
+    for (GridWalk walk(path, 1, lower, lower + Clearance::cellSide, from, to); walk.inside(); walk.step()) {
         const CornerValues values = cellValues(field, entry, walk.cube & 7);
         if (*std::min_element(values.begin(), values.end()) >= 0) continue;
         const glm::dvec3 start = path.at(walk.enter) - glm::dvec3(walk.cube);
@@ -165,18 +165,18 @@ std::optional<double> firstInside(const FieldData& field, const Path& path) noex
     const auto clipped = clip(path, glm::dvec3(0), glm::dvec3(extentOf(field)));
     if (!clipped) return std::nullopt;
     const auto [from, to] = *clipped;
-    const glm::ivec3 parts = field.parts();
-    for (GridWalk walk(path, Clearance::partSide, glm::ivec3(0), parts, from, to); walk.inside();) {
-        const std::int32_t entry = entryAt(field, Clearance::partSide * walk.cube);
+    const glm::ivec3 counts = field.coarseCells();
+    for (GridWalk walk(path, Clearance::cellSide, glm::ivec3(0), counts, from, to); walk.inside();) {
+        const std::int32_t entry = entryAt(field, Clearance::cellSide * walk.cube);
         if (entry == FieldFrame::emptyInside) return walk.enter;
         const double stride = clearanceAt(field, path.at(walk.enter));
         if (stride >= minCubeStride) {
-            if (isPartInside(field, entry, walk.cube)) return walk.enter;
-            walk = GridWalk(path, Clearance::partSide, glm::ivec3(0), parts, walk.enter + stride, to);
+            if (isCellInside(field, entry, walk.cube)) return walk.enter;
+            walk = GridWalk(path, Clearance::cellSide, glm::ivec3(0), counts, walk.enter + stride, to);
             continue;
         }
         if (entry >= 0 && !field.coarse.isAbove(glm::vec3(walk.cube) + 0.5f, 0)) {
-            const auto along = firstInsidePart(field, path, walk.cube, walk.enter, walk.leave());
+            const auto along = firstInsideCell(field, path, walk.cube, walk.enter, walk.leave());
             if (along) return along;
         }
         walk.step();

@@ -77,9 +77,9 @@ class ZeroSearch {
     double limit() const { return query_.limit(); }
 
     void visit(const DirectoryCube& cube) {
-        constexpr int blockLevel = 3, partLevel = 2;
+        constexpr int blockLevel = 3, cellLevel = 2;
         if (cube.level == blockLevel && entryAt(field_, cube.lower) < 0) return;
-        if (cube.level == partLevel) return visitPart(cube.lower);
+        if (cube.level == cellLevel) return visitCell(cube.lower);
         std::array<Child<DirectoryCube>, 8> children;
         std::size_t count = 0;
         const int level = cube.level - 1, side = 1 << level;
@@ -99,10 +99,10 @@ class ZeroSearch {
     }
 
     // Visits the cells of a coarse cell that contain surface.
-    void visitPart(const glm::ivec3& part) {
-        constexpr int side = Clearance::partSide;
-        const std::int32_t entry = entryAt(field_, part);
-        const auto rows = insideRows(field_, entry, part & 7);
+    void visitCell(const glm::ivec3& cell) {
+        constexpr int side = Clearance::cellSide;
+        const std::int32_t entry = entryAt(field_, cell);
+        const auto rows = insideRows(field_, entry, cell & 7);
         std::array<Child<Cell>, side * side * side> children;
         std::size_t count = 0;
         for (int x = 0; x < side; ++x)
@@ -112,7 +112,7 @@ class ZeroSearch {
                 const unsigned mixed = (some | some >> 1) & ~(all & all >> 1);
                 for (int z = 0; z < side; ++z) {
                     if (!(mixed >> z & 1)) continue;
-                    const glm::ivec3 voxel = part + glm::ivec3(x, y, z);
+                    const glm::ivec3 voxel = cell + glm::ivec3(x, y, z);
                     const double bound = query_.bound(glm::dvec3(voxel), glm::dvec3(voxel + 1));
                     if (bound < limit()) children[count++] = {bound, {voxel, entry}};
                 }

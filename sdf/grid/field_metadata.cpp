@@ -66,7 +66,7 @@ bool hasCleanNormalSigns(const LevelSet& field, const BuildOptions& options) {
     // A different error bound shows that the distances were swept or rounded since the build.
     return text(metadata::version) == BILAYER_VERSION &&
            field.errorBound() == errorBound(options) * options.voxelSize &&
-           text(metadata::sign) == nameOf(Sign::normals) && (reason == asAskedFor || reason == closedAndOriented) &&
+           text(metadata::sign) == nameOf(Sign::normals) && (reason == asRequested || reason == closedAndOriented) &&
            isNone(metadata::signConflicts) && isNone(metadata::signUndecided);
 }
 

@@ -24,9 +24,9 @@ enum class NormalsCheck { none, count, correct };
 
 /// How the parts of a field find their signs. This is decided once, for all of them.
 struct PartSigns {
-    Sign method = Sign::normals;      ///< or `winding`, of a closed mesh, or `flood`, which leaves distances unsigned
-    std::string reason = asAskedFor;  ///< as chooseSign() states it
-    std::string name{};               ///< of the method in the metadata; empty: that of `method`
+    Sign method = Sign::normals;       ///< or `winding`, of a closed mesh, or `flood`, which leaves distances unsigned
+    std::string reason = asRequested;  ///< as chooseSign() states it
+    std::string name{};                ///< of the method in the metadata; empty: that of `method`
     NormalsCheck check = NormalsCheck::none;
     /// The sums of all crossings below the part, of the columns of all blocks that it fills. Needed by `winding` and
     /// by a check.

@@ -46,7 +46,7 @@ bool fillMoved(FieldFiller& filler, const LevelSet& old, const Mesh& oldMesh, st
     }
     const DirtyRegion dirty(oldMesh, mesh, moved, voxelsPerUnit, reach, side);
     filler.times().prepare += watch.lap();
-    const std::string reason = options.sign == Sign::automatic ? closedAndOriented : asAskedFor;
+    const std::string reason = options.sign == Sign::automatic ? closedAndOriented : asRequested;
     filler.fillFrom(mesh, mesh, Sign::normals, reason, options.method, [&](MeshJob& job, Assembler& assembler) {
         job.wanted = [&](const glm::ivec3& first, int cube) { return dirty.any(first, cube); };
         assembler.copy(old.grids(), [&](const openvdb::Coord& block) {

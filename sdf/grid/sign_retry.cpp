@@ -72,7 +72,7 @@ void fillWithAutomaticSign(FieldFiller& filler) {
 
 void fillWithRequestedSign(FieldFiller& filler) {
     const BuildOptions& options = filler.options();
-    filler.fill(filler.mesh(), options.sign, asAskedFor, options.method);
+    filler.fill(filler.mesh(), options.sign, asRequested, options.method);
     if (options.sign != Sign::normals || filler.signs().conflicts == 0) return;
     const Orientation orientation = orient(filler.mesh(), &filler.progress());
     if (orientation.flippedTriangles > 0)

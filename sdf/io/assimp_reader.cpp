@@ -152,13 +152,14 @@ class AssimpScene {
 Polygons readByAssimp(const std::filesystem::path& path) {
     // Never deleted, because Assimp frees some scenes incorrectly, for example 3MF files with thumbnails.
     Assimp::Importer& importer = *new Assimp::Importer;
-    const std::string ending = path.extension().string();
-    if (!importer.IsExtensionSupported(ending.c_str()))
+    const std::string extension = path.extension().string();
+    if (!importer.IsExtensionSupported(extension.c_str()))
         throw std::runtime_error(
-            ending.empty() ? "has no ending that would name its format, as .obj, .ply, .stl, .off, .gltf or .glb"
-                           : fmt::format("{} is not the ending of a format that is read, as .obj, .ply, .stl, .off, "
-                                         ".gltf or .glb",
-                                         ending));
+            extension.empty()
+                ? "has no extension that would name its format, as .obj, .ply, .stl, .off, .gltf or .glb"
+                : fmt::format("{} is not the extension of a format that is read, as .obj, .ply, .stl, .off, "
+                              ".gltf or .glb",
+                              extension));
     importer.SetIOHandler(new RegularFiles);  // the importer takes ownership
     importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
     importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);

@@ -24,10 +24,10 @@ void requireInputFile(const std::filesystem::path& path) {
     require(isReadable, std::generic_category().message(errno));
 }
 
-std::string lowerEnding(const std::filesystem::path& path) {
-    std::string ending = path.extension().string();
-    for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
-    return ending;
+std::string lowerExtension(const std::filesystem::path& path) {
+    std::string extension = path.extension().string();
+    for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
+    return extension;
 }
 
 }  // namespace bilayer::detail

@@ -24,6 +24,6 @@ auto namingFile(const std::filesystem::path& path, const Work& work) {
 }
 
 /// Returns the extension of a path in lower case, with its dot: ".obj".
-std::string lowerEnding(const std::filesystem::path& path);
+std::string lowerExtension(const std::filesystem::path& path);
 
 }  // namespace bilayer::detail

@@ -105,10 +105,10 @@ std::vector<FileSection> stlOf(const Mesh& mesh) {
 }
 
 std::vector<FileSection> contentsOf(const Mesh& mesh, const std::filesystem::path& path) {
-    const std::string ending = lowerEnding(path);
-    if (ending == ".obj") return objOf(mesh);
-    if (ending == ".ply") return plyOf(mesh);
-    if (ending == ".stl") return stlOf(mesh);
+    const std::string extension = lowerExtension(path);
+    if (extension == ".obj") return objOf(mesh);
+    if (extension == ".ply") return plyOf(mesh);
+    if (extension == ".stl") return stlOf(mesh);
     throw std::invalid_argument(fmt::format("{}: meshes are written as .obj, .ply or .stl", path.string()));
 }
 

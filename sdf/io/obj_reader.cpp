@@ -89,7 +89,7 @@ class PartReader {
     }
 
     // Returns whether a backslash at the end of a line joins the next line to it. Blanks may follow it.
-    bool atJoint() const {
+    bool atContinuation() const {
         if (at_.atEnd() || *at_.at != '\\') return false;
         Cursor rest{at_.at + 1, at_.end};
         rest.skipBlanks();
@@ -97,7 +97,7 @@ class PartReader {
     }
 
     void skipBlanks() {
-        for (at_.skipBlanks(); atJoint(); at_.skipBlanks()) {
+        for (at_.skipBlanks(); atContinuation(); at_.skipBlanks()) {
             at_.skipLine();
             const bool both = at_.end - at_.at >= 2 && at_.at[0] == '\r' && at_.at[1] == '\n';
             at_.at += both ? 2 : 1;
@@ -110,7 +110,7 @@ class PartReader {
             while (!atWordEnd()) ++at_.at;
     }
 
-    bool atWordEnd() const { return at_.atEnd() || isSpace(*at_.at) || atJoint(); }
+    bool atWordEnd() const { return at_.atEnd() || isSpace(*at_.at) || atContinuation(); }
     bool atLineEnd() const { return at_.atEnd() || isLineEnd(*at_.at) || *at_.at == '#'; }
 
     void readVertex() {
@@ -169,7 +169,7 @@ class PartReader {
 };
 
 /// Returns whether a text ends with a backslash and blanks.
-bool endsWithJoint(const char* begin, const char* end) {
+bool endsWithContinuation(const char* begin, const char* end) {
     while (end != begin && isBlank(end[-1])) --end;
     return end != begin && end[-1] == '\\';
 }
@@ -183,7 +183,7 @@ std::vector<ObjPart> cut(const TextSource& source) {
         const char* last = end;
         while (last != begin && isLineEnd(last[-1])) --last;
         // joined lines stay in the same part
-        while (end != source.end() && endsWithJoint(begin, last)) {
+        while (end != source.end() && endsWithContinuation(begin, last)) {
             while (end != source.end() && !isLineEnd(*end)) ++end;
             last = end;
             while (end != source.end() && isLineEnd(*end)) ++end;

@@ -25,10 +25,10 @@ constexpr std::size_t memoryPerByte = 100;
 
 // "DAE" for a.dae
 std::string formatOf(const std::filesystem::path& path) {
-    std::string ending = path.extension().string();
-    if (!ending.empty()) ending.erase(0, 1);
-    for (char& c : ending) c = char(std::toupper(static_cast<unsigned char>(c)));
-    return ending;
+    std::string extension = path.extension().string();
+    if (!extension.empty()) extension.erase(0, 1);
+    for (char& c : extension) c = char(std::toupper(static_cast<unsigned char>(c)));
+    return extension;
 }
 
 bool isGltf(const std::string& format) {

@@ -23,11 +23,11 @@ namespace {
 /// Maximum fraction of the area that may bound no volume, for winding numbers to be meaningful. Of the 35 public meshes
 /// that stay open or broken after orienting, 24 have less than 0.1. The others (triangle soups, open surfaces,
 /// furniture with single-sided walls) have 0.2 or more.
-constexpr double maxIdle = 0.15;
+constexpr double maxUnboundedShare = 0.15;
 
 constexpr const char* unionOfSolids = "union of overlapping solids";
 
-std::string holes(const Mesh& mesh, Progress* progress) {
+std::string describeEdgeDefects(const Mesh& mesh, Progress* progress) {
     std::size_t boundary = 0, odd = 0, misoriented = 0;
     Topology(mesh, progress).forEachEdge([&](std::span<const EdgeUse> uses) {
         int net = 0;
@@ -50,18 +50,18 @@ std::string percent(double part) {
     return fmt::format("{:.0f} %", 100 * part);
 }
 
-std::string flipped(const Orientation& orientation) {
+std::string describeFlips(const Orientation& orientation) {
     return orientation.flippedTriangles ? fmt::format("; {} triangles were flipped", orientation.flippedTriangles) : "";
 }
 
 // Selects normals for a mesh that flipping triangles has closed, else winding numbers if they separate the sides.
 SignChoice chooseFor(Orientation orientation, std::string trouble, Progress* progress) {
     SignChoice choice;
-    trouble += flipped(orientation);
+    trouble += describeFlips(orientation);
     const bool closed = balanced(orientation.mesh, progress);
     const bool oneSided = 2 * orientation.oneSidedTriangles > orientation.mesh.triangles.size();
     const Bounding share = bounding(orientation.mesh, progress, closed);
-    const bool separates = !oneSided && share.nothing + share.reversed <= maxIdle;
+    const bool separates = !oneSided && share.nothing + share.reversed <= maxUnboundedShare;
     if (orientation.flippedTriangles) choice.repaired = std::move(orientation.mesh);
     choice.sign = !separates ? Sign::flood : closed && choice.repaired ? Sign::normals : Sign::winding;
     if (choice.sign == Sign::normals)
@@ -131,12 +131,12 @@ bool foldsBack(const Mesh& mesh, Progress* progress) {
 SignChoice chooseSign(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     if (balanced(mesh, progress)) return {Sign::normals, closedAndOriented, {}};
-    return chooseFor(orient(mesh, progress), holes(mesh, progress), progress);
+    return chooseFor(orient(mesh, progress), describeEdgeDefects(mesh, progress), progress);
 }
 
 SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress) {
     const SignChoice choice = chooseSign(mesh, progress);
-    if (choice.sign != Sign::normals || choice.repaired || bounding(mesh, progress, true).nothing <= maxIdle)
+    if (choice.sign != Sign::normals || choice.repaired || bounding(mesh, progress, true).nothing <= maxUnboundedShare)
         return choice;
     return chooseFor(orient(mesh, progress), "closed and oriented, but of two-sided open surfaces", progress);
 }
@@ -156,7 +156,7 @@ Mesh orientedMesh(const LevelSet& levelSet, Mesh mesh) {
     if (levelSet.origin() != mesh.origin)
         throw std::invalid_argument("the level set has another origin than the mesh: one of them was moved");
     const std::string& reason = levelSet.signReason();
-    const bool asItStands = reason == closedAndOriented || reason == asAskedFor;
+    const bool asItStands = reason == closedAndOriented || reason == asRequested;
     if (levelSet.sign() == "normals" && asItStands) return mesh;
     return orient(mesh).mesh;
 }

@@ -39,7 +39,7 @@ struct SignChoice {
 /// The reason if balanced() alone decided.
 inline constexpr const char* closedAndOriented = "closed and oriented";
 /// The reason if the user selected the method.
-inline constexpr const char* asAskedFor = "as asked for";
+inline constexpr const char* asRequested = "as asked for";
 
 /// Returns the reason for signs of a union. outwardMesh() recognizes from it that walls were removed.
 std::string unionReason(const UnionSurface& united);

@@ -39,7 +39,7 @@ PartSigns requested(const BuildOptions& options, const TriangleSource& source) {
     if (options.sign == Sign::flood) return {.method = Sign::flood};
     if (options.sign != Sign::winding) return {};
     if (!source.isBalanced()) refuseOpen("this one has edges that are not used equally often in both directions");
-    return byWinding(asAskedFor);
+    return byWinding(asRequested);
 }
 
 // The choice of build() after normals have contradicted each other so often.

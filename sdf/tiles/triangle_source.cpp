@@ -207,10 +207,10 @@ std::unique_ptr<TriangleSource> trianglesOf(Mesh flipped, std::uint64_t hash) {
 }
 
 std::unique_ptr<TriangleSource> trianglesOfFile(const std::filesystem::path& path) {
-    const std::string ending = lowerEnding(path);
+    const std::string extension = lowerExtension(path);
     const MappedFile file(path, MappedFile::Paging::onDemand);
-    if (ending == ".stl" && StlTriangles::accepts(file.bytes())) return std::make_unique<StlTriangles>(path);
-    if (ending != ".ply") return nullptr;
+    if (extension == ".stl" && StlTriangles::accepts(file.bytes())) return std::make_unique<StlTriangles>(path);
+    if (extension != ".ply") return nullptr;
     const TextSource source(path, file.bytes());
     const PlyHeader header = readPlyHeader(path, source);
     if (!PlyTriangles::accepts(header)) return nullptr;

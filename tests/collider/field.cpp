@@ -86,7 +86,7 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    const float edge = Clearance::partSide * float(h);
+    const float edge = Clearance::cellSide * float(h);
     for (const Solid& solid : smallSolids()) {
         const Field field(levelSetOf(solid, h, 3, 6));
         const Clearance clearance = field.data().coarse;

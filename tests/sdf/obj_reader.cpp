@@ -43,11 +43,11 @@ TEST_CASE("OBJ: lines and files may be written in any way") {
     for (const bool little : {false, true})
         for (const bool mark : {false, true}) checkBox(write("wide.obj", utf16(text, little, mark)));
     checkBox(write("end.obj", text.substr(0, text.size() - 1)));
-    for (const char* joint : {"\\\n", "\\ \n", "\\\t \t\r\n", "\\ \r"}) {
-        CAPTURE(joint);
-        checkBox(write("joined.obj", replaced(text, " 4 ", fmt::format(" {}4 ", joint))));
-        checkBox(write("joined.obj", replaced(text, " ", joint)));
-        checkBox(write("joined.obj", replaced(text, " ", fmt::format("{} ", joint))));
+    for (const char* continuation : {"\\\n", "\\ \n", "\\\t \t\r\n", "\\ \r"}) {
+        CAPTURE(continuation);
+        checkBox(write("joined.obj", replaced(text, " 4 ", fmt::format(" {}4 ", continuation))));
+        checkBox(write("joined.obj", replaced(text, " ", continuation)));
+        checkBox(write("joined.obj", replaced(text, " ", fmt::format("{} ", continuation))));
     }
     CHECK_THROWS_WITH(readMesh(write("slash.obj", text + "f 1 2 \\ 3\n")), Catch::Contains("line 15: '\\'"));
     // parts of a long text end between statements

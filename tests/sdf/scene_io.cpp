@@ -97,9 +97,9 @@ TEST_CASE("skeletons make no surface") {
     CHECK_THROWS_WITH(readMesh(path), Catch::Contains("holds no triangle"));
 }
 
-TEST_CASE("what no reader knows is refused by its ending") {
-    CHECK_THROWS_WITH(readScene(write({"a.xyz", "1 2 3"})), Catch::Contains("a.xyz: .xyz is not the ending"));
-    CHECK_THROWS_WITH(readScene(write({"bare", "1 2 3"})), Catch::Contains("bare: has no ending"));
+TEST_CASE("what no reader knows is refused by its extension") {
+    CHECK_THROWS_WITH(readScene(write({"a.xyz", "1 2 3"})), Catch::Contains("a.xyz: .xyz is not the extension"));
+    CHECK_THROWS_WITH(readScene(write({"bare", "1 2 3"})), Catch::Contains("bare: has no extension"));
     CHECK_THROWS_WITH(readScene("/nonexistent.dae"), Catch::Contains("/nonexistent.dae: no such file"));
 }
 

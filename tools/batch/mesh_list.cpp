@@ -19,13 +19,13 @@ namespace {
 namespace fs = std::filesystem;
 
 // Formats with meshes in use. Other formats that readMesh() supports can be listed by name.
-constexpr std::array<std::string_view, 10> meshEndings{".obj", ".ply", ".stl", ".off", ".gltf",
-                                                       ".glb", ".3mf", ".dae", ".fbx", ".3ds"};
+constexpr std::array<std::string_view, 10> meshExtensions{".obj", ".ply", ".stl", ".off", ".gltf",
+                                                          ".glb", ".3mf", ".dae", ".fbx", ".3ds"};
 
 bool isMesh(const fs::directory_entry& entry) {
-    const std::string ending = detail::lowerEnding(entry.path());
+    const std::string extension = detail::lowerExtension(entry.path());
     std::error_code ignored;  // of a link that leads nowhere: reading it reports why
-    return std::find(meshEndings.begin(), meshEndings.end(), ending) != meshEndings.end() &&
+    return std::find(meshExtensions.begin(), meshExtensions.end(), extension) != meshExtensions.end() &&
            !entry.is_directory(ignored);
 }
 

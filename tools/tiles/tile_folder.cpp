@@ -46,10 +46,10 @@ void TileFolder::removeGrowth() const {
     removeFromWork({".regions", ".by_distance", ".by_triangles", ".improved"});
 }
 
-void TileFolder::removeFromWork(std::initializer_list<const char*> endings) const {
+void TileFolder::removeFromWork(std::initializer_list<const char*> extensions) const {
     std::vector<std::filesystem::path> found;
     for (const auto& entry : std::filesystem::directory_iterator(work()))
-        if (std::find(endings.begin(), endings.end(), entry.path().extension()) != endings.end())
+        if (std::find(extensions.begin(), extensions.end(), entry.path().extension()) != extensions.end())
             found.push_back(entry.path());
     for (const auto& path : found) std::filesystem::remove(path);
 }

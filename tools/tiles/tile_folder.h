@@ -64,7 +64,7 @@ class TileFolder {
     std::filesystem::path work() const { return root_ / "work"; }
 
   private:
-    void removeFromWork(std::initializer_list<const char*> endings) const;
+    void removeFromWork(std::initializer_list<const char*> extensions) const;
     static std::string nameOf(const glm::ivec3& tile);
 
     std::filesystem::path root_;
