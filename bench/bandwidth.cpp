@@ -69,6 +69,7 @@ double randomLines(std::size_t bytes, int threads) {
         std::uint64_t sum = 0;
         for (std::size_t i = 0; i < randomReads; ++i) {
             // the high half of the product is uniform over any count of lines, without a division
+            // mixed well, so that no prefetcher detects a stride
             const std::uint64_t place = (detail::mixedBits(i + std::size_t(thread) * randomReads) >> 32) * lines >> 32;
             sum += buffer[place * (cacheLine / sizeof(std::uint64_t))];
         }

@@ -13,7 +13,7 @@ namespace bilayer {
 
 /// Options of distance().
 struct DistanceOptions {
-    /// The search ends early if the separation exceeds this [m] by more than 2e-6 of the size of the larger collider.
+    /// The search ends early if the separation exceeds this [m] by more than 2e-6 of the size of the larger body.
     /// Zero finds only bodies that overlap or touch. A negative limit is zero.
     float maxDistance = std::numeric_limits<float>::infinity();
 };
@@ -115,8 +115,9 @@ struct Impact {
 ///
 /// With ImpactOptions::penetration, points of either body are followed along their paths through the other one: the
 /// surface points of a collider, the vertices and edges of other shapes. A point penetrates where it gets more than a
-/// third of the smaller voxel into the other body, or deeper than it starts. The bodies are then at most half a voxel
-/// before the place where it enters. No triangles are needed; what passes between surface points is not seen.
+/// third of the smaller voxel into the other body, or, if it starts in contact, deeper than it starts by up to 0.1
+/// voxels. The bodies are then at most half a voxel before the place where it enters. No triangles are needed; what
+/// passes between surface points is not seen.
 Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options = {});
 
 /// The same for two shapes, at least one of them a collider. Throws std::invalid_argument also if neither is, and for a

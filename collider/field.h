@@ -91,9 +91,9 @@ class Field {
     ///   than a voxel, where the side changes between two voxels without a surface.
     /// - Where the field is not certain, the kind of mesh decides:
     ///   - closed, signed by winding numbers: the winding number.
-    ///   - closed, signed by normals: the normal at the closest feature, where the sample agrees with it and within a
-    ///     tenth of a voxel of the surface; else the winding number. It errs only where the surface comes within a
-    ///     voxel of itself.
+    ///   - closed, signed by normals: the normal at the closest feature, where the sample agrees with it or both are
+    ///     within a tenth of a voxel of the surface; else the winding number. The normal errs only where the surface
+    ///     comes within a voxel of itself.
     ///   - open, signed by winding numbers: the winding number; over a face with no other surface within a voxel the
     ///     normal, which is faster.
     ///   - others: the normal if the field confirms that the wall separates inside from outside, else the sample.

@@ -60,11 +60,8 @@ Extent extentOf(const Placed& body) {
 }
 
 Extent extentOf(const Convex& convex, double scale) {
-    double radius = 0;
-    const auto vertices = convex.vertices();
-    for (std::uint32_t i = 0; i < vertices.size(); ++i)
-        radius = std::max(radius, double(glm::length(vertices[i]) + convex.radius(i)));
-    return {scale * radius, 2 * scale * radius};
+    const double radius = scale * convex.boundingRadius();
+    return {radius, 2 * radius};
 }
 
 Extent extentOf(const PlacedShape& body, const std::string& motion) {

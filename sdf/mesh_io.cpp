@@ -14,7 +14,7 @@ using namespace detail;
 
 namespace {
 
-Mesh readByEnding(const std::filesystem::path& path, ReadReport& report) {
+Mesh readByExtension(const std::filesystem::path& path, ReadReport& report) {
     const std::string extension = lowerExtension(path);
     if (extension == ".obj") return readObj(path, report);
     if (extension == ".ply") return readPly(path, report);
@@ -29,7 +29,7 @@ Mesh readByEnding(const std::filesystem::path& path, ReadReport& report) {
 
 MeshFile readMeshFile(const std::filesystem::path& path) {
     MeshFile file;
-    file.mesh = readByEnding(path, file.report);
+    file.mesh = readByExtension(path, file.report);
     return file;
 }
 

@@ -172,12 +172,11 @@ void addBody(CLI::App& command, BuildArguments& a) {
     auto* group = command.add_option_group("body", "what rigid bodies need in addition to the field");
     group->add_flag("--body", a.body,
                     "also store surface points, mass, margin and the mesh: all that a collider needs");
-    auto* contacts =
-        group
-            ->add_option(
-                "--contacts", a.contacts,
-                "contact accuracy: samples alone, triangles near edges: exact-near-features (default), or everywhere")
-            ->check(CLI::IsMember(contactAccuracies));
+    auto* contacts = group
+                         ->add_option("--contacts", a.contacts,
+                                      "contact accuracy: by samples, by triangles near edges and vertices, or by "
+                                      "triangles everywhere; default exact-near-features")
+                         ->check(CLI::IsMember(contactAccuracies));
     auto* noMesh =
         group->add_flag("--no-mesh", a.noMesh, "store no mesh: the file is smaller, and sharp edges are rounded");
     a.bodyOptions = {

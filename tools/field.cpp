@@ -119,11 +119,11 @@ void runExport(const FieldArguments& a) {
     table.print();
 }
 
-std::string requireNanoEnding(const std::string& path) {
+std::string requireNanoExtension(const std::string& path) {
     return std::filesystem::path(path).extension() == ".nvdb" ? "" : "must end in .nvdb";
 }
 
-std::string requireMeshEnding(const std::string& path) {
+std::string requireMeshExtension(const std::string& path) {
     const std::string extension = std::filesystem::path(path).extension().string();
     return extension == ".ply" || extension == ".obj" || extension == ".stl" ? "" : "must end in .ply, .obj or .stl";
 }
@@ -145,7 +145,7 @@ void addSurface(CLI::App& app) {
     command->add_option("field", a->field, "a .vdb file")->required();
     command->add_option("-o,--output", a->output, "a .ply, .obj or .stl file")
         ->required()
-        ->check(CLI::Validator(requireMeshEnding, "PATH"));
+        ->check(CLI::Validator(requireMeshExtension, "PATH"));
     command->add_option("--isovalue", a->options.isovalue, "distance of the surface, default 0")->check(finite());
     command->add_option("--adaptivity", a->options.adaptivity, "0 (default): uniform .. 1: fewest triangles")
         ->check(within(0, 1));
@@ -158,7 +158,7 @@ void addExport(CLI::App& app) {
     command->add_option("field", a->field, "a .vdb file")->required();
     command->add_option("-o,--output", a->output, "a .nvdb file")
         ->required()
-        ->check(CLI::Validator(requireNanoEnding, "PATH"));
+        ->check(CLI::Validator(requireNanoExtension, "PATH"));
     command->add_flag("--json", a->json, "print one JSON object");
     command->callback([a] { runExport(*a); });
 }

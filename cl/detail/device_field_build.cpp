@@ -25,9 +25,9 @@ extern const char* const field_build_cl;  // the text of field_build.cl
 
 namespace {
 
-constexpr std::size_t itemsAlongParts = 32;        // along z, which is contiguous in memory
+constexpr std::size_t itemsAlongCells = 32;        // along z, which is contiguous in memory
 constexpr cl_int unknownEntry = -3;                // UNKNOWN of field_build.cl
-constexpr cl_float maxCells = 16;                  // MAX_PARTS of field_build.cl
+constexpr cl_float maxCells = 16;                  // MAX_CELLS of field_build.cl
 constexpr const char* fieldPurpose = "the field";  // of memory, for error texts
 
 // `Widths` of field_build.cl.
@@ -89,10 +89,10 @@ class DeviceFieldBuilder {
     }
     // Enqueues a kernel with a work-item for each coarse cell that has a clearance.
     template <class... Arguments>
-    void enqueueParts(const char* name, const Arguments&... arguments) {
+    void enqueueCells(const char* name, const Arguments&... arguments) {
         const glm::ivec3 size = layout_.frame.coarseCells();
-        enqueue(name, cl::NDRange(roundedUp(std::size_t(size.z), itemsAlongParts), size.y, size.x),
-                cl::NDRange(itemsAlongParts, 1, 1), arguments...);
+        enqueue(name, cl::NDRange(roundedUp(std::size_t(size.z), itemsAlongCells), size.y, size.x),
+                cl::NDRange(itemsAlongCells, 1, 1), arguments...);
     }
 
     DeviceImpl& device_;
@@ -236,12 +236,12 @@ void DeviceFieldBuilder::computeClearances() {
     layout_.centres = memory_.allocate(count * sizeof(cl_char), fieldPurpose);
     std::array<cl::Buffer, 2> distances2;
     for (cl::Buffer& buffer : distances2) buffer = memory_.allocate(count * sizeof(cl_float), fieldPurpose);
-    enqueueParts("initialiseParts", frame, far, layout_.directory, layout_.values, distances2[0], layout_.centres);
+    enqueueCells("initialiseCells", frame, far, layout_.directory, layout_.values, distances2[0], layout_.centres);
     for (cl_int axis = 2; axis >= 0; --axis) {
-        enqueueParts("transformParts", frame, axis, distances2[0], distances2[1]);
+        enqueueCells("transformCells", frame, axis, distances2[0], distances2[1]);
         std::swap(distances2[0], distances2[1]);
     }
-    enqueueParts("storeCentres", frame, distances2[0], layout_.centres);
+    enqueueCells("storeCentres", frame, distances2[0], layout_.centres);
     device_.queue.finish();
     for (cl::Buffer& buffer : distances2) memory_.free(buffer);
     memory_.free(summary_);

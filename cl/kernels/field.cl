@@ -53,13 +53,13 @@ float interpolationError(float3 fraction) {
 
 // Clearance::around() [voxels].
 float clearanceAt(const Field* field, double3 position) {
-    const double3 point = position / (double)(PART_SIDE);
-    const int3 size = BLOCK_SIDE / PART_SIDE * blocksOf(field);
+    const double3 point = position / (double)(COARSE_SIDE);
+    const int3 size = BLOCK_SIDE / COARSE_SIDE * blocksOf(field);
     const int3 part = min(convert_int3(clamp(point, (double3)(0.0), convert_double3(size))), size - 1);
     const double3 offset = point - (convert_double3(part) + 0.5);
     const float length = (float)(sqrt(offset.x * offset.x + offset.y * offset.y + offset.z * offset.z));
     const float centre = (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / CLEARANCE_STEPS);
-    return (float)(PART_SIDE) * (fabs(centre) - length);
+    return (float)(COARSE_SIDE) * (fabs(centre) - length);
 }
 
 // The bound for points outside of the directory's box, and for coordinates that are not numbers.

@@ -10,7 +10,7 @@
 // bandEdge of sdf/leaf/band.h [voxels].
 #define BAND_EDGE 1e-5f
 // As in collider/field/coarse_distance.cpp, clearance.h and field_layout.cpp.
-#define MAX_PARTS 16
+#define MAX_CELLS 16
 // Maximum stored distance [CLEARANCE_STEPS].
 #define MAX_CLEARANCE_STEPS 127
 #define NEAR_SURFACE (0.5f * 1.7320508f)
@@ -266,52 +266,52 @@ GROUP_KERNEL void countConflicts(Frame frame, global const int* directory, globa
 }
 
 // The coarse cell of this work-item; some are beyond the last one along z.
-int3 ownPart(void) {
+int3 ownCell(void) {
     return (int3)((int)(get_global_id(2)), (int)(get_global_id(1)), (int)(get_global_id(0)));
 }
 
 // Initialises the clearances: 0 for coarse cells that the surface crosses, `far` for others. Sets only the signs in the
 // centres. A work-item does a cell.
-kernel void initialiseParts(Frame frame, float far, global const int* directory, global const float* values,
+kernel void initialiseCells(Frame frame, float far, global const int* directory, global const float* values,
                             global float* distances2, global char* centres) {
-    const int3 blocks = vload3(0, frame.blocks), part = ownPart(), block = part / PARTS_ALONG;
-    if (part.z >= PARTS_ALONG * blocks.z) return;
-    const size_t p = indexOf(part, PARTS_ALONG * blocks);
+    const int3 blocks = vload3(0, frame.blocks), cell = ownCell(), block = cell / COARSE_ALONG;
+    if (cell.z >= COARSE_ALONG * blocks.z) return;
+    const size_t p = indexOf(cell, COARSE_ALONG * blocks);
     const int entry = directory[indexOf(block, blocks)];
     if (entry < 0) {
         distances2[p] = far;
-        centres[centreOf(part, blocks)] = entry == EMPTY_INSIDE ? -1 : 1;
+        centres[centreOf(cell, blocks)] = entry == EMPTY_INSIDE ? -1 : 1;
         return;
     }
-    global const float* corner = values + voxelOf(entry, PART_SIDE * (part - PARTS_ALONG * block));
+    global const float* corner = values + voxelOf(entry, COARSE_SIDE * (cell - COARSE_ALONG * block));
     float minValue = INFINITY, maxValue = -INFINITY, nearest = INFINITY;
-    for (int x = 0; x <= PART_SIDE; ++x)
-        for (int y = 0; y <= PART_SIDE; ++y)
-            for (int z = 0; z <= PART_SIDE; ++z) {
+    for (int x = 0; x <= COARSE_SIDE; ++x)
+        for (int y = 0; y <= COARSE_SIDE; ++y)
+            for (int z = 0; z <= COARSE_SIDE; ++z) {
                 const float value = corner[(x * STRIDE + y) * STRIDE + z];
                 minValue = min(minValue, value);
                 maxValue = max(maxValue, value);
                 nearest = min(nearest, fabs(value));
             }
     distances2[p] = nearest <= NEAR_SURFACE * frame.voxelSize || (minValue < 0) != (maxValue < 0) ? 0 : far;
-    centres[centreOf(part, blocks)] = minValue < 0 ? -1 : 1;
+    centres[centreOf(cell, blocks)] = minValue < 0 ? -1 : 1;
 }
 
 // Propagates squared distances along one more axis: transformRow() of collider/field/coarse_distance.cpp. A work-item
 // does a coarse cell.
-kernel void transformParts(Frame frame, int axis, global const float* from, global float* to) {
-    const int3 size = PARTS_ALONG * vload3(0, frame.blocks);
-    const int3 part = ownPart();
-    if (part.z >= size.z) return;
-    const size_t p = indexOf(part, size), step = axis == 0 ? (size_t)(size.y) * size.z : axis == 1 ? size.z : 1;
-    const int i = axis == 0   ? part.x
-                  : axis == 1 ? part.y
-                              : part.z,
+kernel void transformCells(Frame frame, int axis, global const float* from, global float* to) {
+    const int3 size = COARSE_ALONG * vload3(0, frame.blocks);
+    const int3 cell = ownCell();
+    if (cell.z >= size.z) return;
+    const size_t p = indexOf(cell, size), step = axis == 0 ? (size_t)(size.y) * size.z : axis == 1 ? size.z : 1;
+    const int i = axis == 0   ? cell.x
+                  : axis == 1 ? cell.y
+                              : cell.z,
               count = axis == 0   ? size.x
                       : axis == 1 ? size.y
                                   : size.z;
     float best = from[p];
-    const int reach = min(MAX_PARTS, max(i, count - 1 - i));
+    const int reach = min(MAX_CELLS, max(i, count - 1 - i));
     for (int d = 1; d <= reach; ++d) {
         const float along2 = ((float)(d)-0.5f) * ((float)(d)-0.5f);
         if (along2 >= best) break;
@@ -324,13 +324,13 @@ kernel void transformParts(Frame frame, int axis, global const float* from, glob
 // Converts squared distances to distances [CLEARANCE_STEPS], rounded down, with the signs of the centres. A work-item
 // does a coarse cell.
 kernel void storeCentres(Frame frame, global const float* distances2, global char* centres) {
-    const int3 blocks = vload3(0, frame.blocks), part = ownPart();
-    if (part.z >= PARTS_ALONG * blocks.z) return;
-    const int squared = (int)(CLEARANCE_STEPS * CLEARANCE_STEPS * distances2[indexOf(part, PARTS_ALONG * blocks)]);
+    const int3 blocks = vload3(0, frame.blocks), cell = ownCell();
+    if (cell.z >= COARSE_ALONG * blocks.z) return;
+    const int squared = (int)(CLEARANCE_STEPS * CLEARANCE_STEPS * distances2[indexOf(cell, COARSE_ALONG * blocks)]);
     int steps = (int)(sqrt((float)(squared)));
     // a device may round square roots either way
     while (steps * steps > squared) --steps;
     while ((steps + 1) * (steps + 1) <= squared) ++steps;
-    global char* centre = centres + centreOf(part, blocks);
+    global char* centre = centres + centreOf(cell, blocks);
     *centre = (char)(*centre * min(steps, MAX_CLEARANCE_STEPS));
 }

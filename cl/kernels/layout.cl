@@ -9,8 +9,8 @@
 #define EMPTY_OUTSIDE -1
 #define EMPTY_INSIDE -2
 // Clearances: voxels along a coarse cell, coarse cells along a block, and the unit of stored distances.
-#define PART_SIDE 4
-#define PARTS_ALONG 2
+#define COARSE_SIDE 4
+#define COARSE_ALONG 2
 #define CLEARANCE_STEPS 8
 
 // FieldFrame of collider/field/field_layout.h; metres and voxels as there.
@@ -36,8 +36,8 @@ size_t voxelOf(int block, int3 inBlock) {
 }
 
 // Index of a coarse cell's distance to the surface. The cells of a block are contiguous, in the order of the directory.
-size_t centreOf(int3 part, int3 blocks) {
-    const int3 inBlock = part & (PARTS_ALONG - 1);
-    return (indexOf(part / PARTS_ALONG, blocks) * PARTS_ALONG + inBlock.x) * PARTS_ALONG * PARTS_ALONG +
-           inBlock.y * PARTS_ALONG + inBlock.z;
+size_t centreOf(int3 cell, int3 blocks) {
+    const int3 inBlock = cell & (COARSE_ALONG - 1);
+    return (indexOf(cell / COARSE_ALONG, blocks) * COARSE_ALONG + inBlock.x) * COARSE_ALONG * COARSE_ALONG +
+           inBlock.y * COARSE_ALONG + inBlock.z;
 }

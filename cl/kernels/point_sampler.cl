@@ -52,23 +52,23 @@ uint queryOf(global const Query* queries, uint count, uint ball) {
 
 // Whether a sphere is certainly outside, farther than `radius` from the surface: Clearance::isOutside() [coarse cells].
 bool isOutside(const Field* field, float3 centre, float radius) {
-    const int3 size = PARTS_ALONG * blocksOf(field);
+    const int3 size = COARSE_ALONG * blocksOf(field);
     const float3 inBox = clamp(centre, (float3)(0.0f), convert_float3(size));
     const float3 toBox = centre - inBox;
     if (dot(toBox, toBox) > radius * radius) return true;
-    const int3 part = min(convert_int3(inBox), size - 1);
-    const float3 toCentre = centre - (convert_float3(part) + 0.5f);
+    const int3 cell = min(convert_int3(inBox), size - 1);
+    const float3 toCentre = centre - (convert_float3(cell) + 0.5f);
     const float clearance =
-        (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / CLEARANCE_STEPS) - radius;
+        (float)(field->centres[centreOf(cell, blocksOf(field))]) * (1.0f / CLEARANCE_STEPS) - radius;
     return clearance > 0 && dot(toCentre, toCentre) < clearance * clearance;
 }
 
 bool mayBeWithinReach(const Field* field, const Query* query, const Ball* ball) {
     const Frame* frame = &field->frame;
-    const float perPart = (float)(frame->perMetre) / (float)(PART_SIDE);
+    const float perCell = (float)(frame->perMetre) / (float)(COARSE_SIDE);
     const double3 place = convert_double3(mapped(query, vload3(0, ball->centre))) - vload3(0, frame->origin);
-    const float reach = query->reach * perPart + MAX_INTERPOLATION_ERROR / (float)(PART_SIDE) + BALL_ROUNDING;
-    return !isOutside(field, convert_float3(place) * perPart, ball->radius * query->scale * perPart + reach);
+    const float reach = query->reach * perCell + MAX_INTERPOLATION_ERROR / (float)(COARSE_SIDE) + BALL_ROUNDING;
+    return !isOutside(field, convert_float3(place) * perCell, ball->radius * query->scale * perCell + reach);
 }
 
 // A work-item tests some consecutive bounding spheres: one on GPUs. Answers beyond the capacity are counted only.

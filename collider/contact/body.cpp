@@ -169,7 +169,7 @@ void requireMeshOf(const LevelSet& levelSet, const Mesh& mesh) {
     const bool asGiven = levelSet.sign() == "normals" && levelSet.signReason() == closedAndOriented;
     if (!asGiven || levelSet.meshHash() == 0) return;
     if (const std::uint64_t its = hash(mesh); its != levelSet.meshHash())
-        refuseBody(fmt::format("'{}' is {:x}, but the hash of its mesh is {:x}", metadata::meshHash,
+        refuseBody(fmt::format("'{}' is {:016x}, but the hash of its mesh is {:016x}", metadata::meshHash,
                                levelSet.meshHash(), its));
 }
 
@@ -182,14 +182,9 @@ constexpr std::pair<ContactAccuracy, const char*> accuracyNames[] = {
     {ContactAccuracy::samples, "samples"},
     {ContactAccuracy::exactNearFeatures, "exact-near-features"},
     {ContactAccuracy::exact, "exact"}};
-// in files of version 0.1
-constexpr std::pair<ContactAccuracy, const char*> formerAccuracyNames[] = {
-    {ContactAccuracy::exactNearFeatures, "edges"}, {ContactAccuracy::exact, "triangles"}};
 
 ContactAccuracy accuracyOf(const std::string& name) {
     for (const auto& [accuracy, itsName] : accuracyNames)
-        if (name == itsName) return accuracy;
-    for (const auto& [accuracy, itsName] : formerAccuracyNames)
         if (name == itsName) return accuracy;
     refuseBody(fmt::format("the contact accuracy '{}' is {}; it must be samples, exact-near-features or exact",
                            entry::accuracy, quotedWord(name)));

@@ -20,7 +20,7 @@ inline Similarity toWorld(const Pose& pose, float scale) {
 
 /// The separation up to which distance() searches [m]. It is larger than the limit by what distances may be off by, so
 /// that bodies at the limit are found, and bodies that touch with a limit of zero.
-/// @param size  of the larger collider: its longest side [m]
+/// @param size  of the larger body [m]
 inline double searchLimit(const DistanceOptions& options, double size) {
     constexpr double tolerance = 2e-6;  // distanceBetween() is exact to 1e-6 of the diagonal
     return std::max(0.0, double(options.maxDistance)) + tolerance * size;

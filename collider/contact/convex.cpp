@@ -42,6 +42,13 @@ NearestPoint Convex::nearest(const glm::vec3& point, float reach) const {
     return nearest;
 }
 
+double Convex::boundingRadius() const {
+    double largest = 0;
+    for (std::uint32_t i = 0; i < vertices().size(); ++i)
+        largest = std::max(largest, double(glm::length(vertices()[i]) + radius(i)));
+    return largest;
+}
+
 /// By Newton's method, which does not overshoot: distance is convex along a path, and so is the bound of a hull's
 /// distance. Once the distance grows, it grows forever.
 std::optional<Convex::PathHit> Convex::castPoint(const glm::vec3& start, const glm::vec3& displacement,

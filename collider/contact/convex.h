@@ -48,6 +48,8 @@ class Convex {
     glm::vec3 support(const glm::vec3& direction) const { return core_->support(direction); }
     /// 0 for spheres, whose radii differ [m].
     float growth() const { return growth_; }
+    /// The radius of a ball around the origin that holds the body [m].
+    double boundingRadius() const;
 
     /// Whether the core is flat at the nearest point.
     bool isFlat(const NearestPoint& nearest) const { return core_->isFlat(nearest); }

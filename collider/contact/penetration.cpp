@@ -26,9 +26,9 @@ namespace {
 // Depth of the test points inside their own body [voxels]. Contacts handle shallower penetration, so that a body that
 // slides along another one is not stopped.
 constexpr float testDepth = 0.25f;
-// A point that starts inside may get this much deeper in a step [voxels]. The steps add up, so that it may be less from
-// this depth on, where a body still slides on at its depth.
-constexpr float maxDeepening = 0.1f, minDeepening = 0.02f, maxStartDepth = 0.45f;
+// A point that starts inside may get deeper in a step, so that a body slides on at its depth: up to this depth, but by
+// at least and at most this much [voxels]. A fixed amount would add up from step to step.
+constexpr float maxStartDepth = 0.45f, minDeepening = 0.02f, maxDeepening = 0.1f;
 // Maximum depth of a surface point below the plane where its test point enters [voxels].
 constexpr float maxDepth = testDepth + maxDeepening;
 // A stopped body goes back by this much at most from where the test point entered [voxels]. An oblique path touches far
@@ -159,6 +159,7 @@ class PointSweep {
         const auto depenetration = depenetrationOf(point.place, rounded.outward, point.radius);
         if (!depenetration) return;
         const glm::vec3 offset = *depenetration;
+        const float lead = Surface::isOpen && offset != glm::vec3(0) ? startHeight * voxel_ : 0;
         glm::vec3 from = transforms_.front()(point.place) + offset;
         std::optional<SurfaceEntry> entered;
         float stop = 0;  // where the body stops if the point that has entered gets too deep
@@ -169,7 +170,7 @@ class PointSweep {
             if (!wasInside) entered = entryOf(from, to, ahead, point.radius);
             if (entered) {
                 const float touching = point.touchingDepth(glm::dot(ahead, entered->normal));
-                if (!wasInside) stop = stoppingTime(i, chordOf(*entered, from, to, point.radius), touching);
+                if (!wasInside) stop = stoppingTime(i, chordOf(*entered, from, to, point.radius), touching, lead);
                 const float limit = offset == glm::vec3(0) ? maxDepth * voxel_ + touching : deepening(offset) * voxel_;
                 if (getsDeeper(*entered, to, point.radius, limit)) {
                     first_ = {std::min(stop, first_.time), entered->position - offset, entered->normal};
@@ -226,8 +227,9 @@ class PointSweep {
     /// When a body stops whose test point enters on a chord: when the point itself touches, if that is not far back.
     /// Before the chord the path has another direction.
     /// @param touching  depth of the test point then
-    float stoppingTime(std::size_t chordIndex, const Chord& chord, float touching) const {
-        const float entering = chord.partAt(0),
+    /// @param lead      height of the test point above the surface at its start, if it was moved back to that
+    float stoppingTime(std::size_t chordIndex, const Chord& chord, float touching, float lead) const {
+        const float entering = chord.partAt(-lead),
                     part = std::max(chord.partAt(touching), entering - maxReturn * voxel_ / chord.length);
         // there is too little path to go back on: the body stops where the point enters
         const bool isAtStart = chordIndex == 0 && part * chord.length < minAdvance * voxel_;

@@ -46,8 +46,8 @@ inline Penetration earlier(const Penetration& one, const Penetration& other, con
 
 /// Follows points of each shape through the other one: the surface points of a collider, and the vertices and edges of
 /// a convex body and of an open surface. One of the shapes is a collider. A point penetrates where it gets more
-/// than a third of a voxel into the other body, or deeper than it is at the start. Bodies may thus rest, slide and roll
-/// on each other, and start in contact. The time is at most that at which the point enters.
+/// than a third of a voxel into the other body, or noticeably deeper than it is at the start. Bodies may thus rest,
+/// slide and roll on each other, and start in contact. The time is at most that at which the point enters.
 Penetration firstPenetration(const SweptShape& a, const SweptShape& b);
 
 }  // namespace bilayer::detail

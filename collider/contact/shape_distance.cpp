@@ -52,6 +52,13 @@ BodyDistance separated(const ShapeAndCollider& bodies, const SolidDistance& foun
     return answer;
 }
 
+/// Of the larger body, if the shape has a size [m].
+double sizeOf(const ShapeAndCollider& bodies) {
+    const auto* convex = std::get_if<Convex>(&bodies.a.shape.data().shape);
+    const double ofShape = convex ? 2 * double(bodies.a.scale) * convex->boundingRadius() : 0;
+    return std::max(ofShape, detail::sizeOf(bodies.b));
+}
+
 /// Keeps the deeper of two answers.
 void take(BodyDistance& deepest, const BodyDistance& other) {
     if (other.distance < deepest.distance) deepest = other;
@@ -199,7 +206,7 @@ BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const Distance
     const Order order = orderOf(a, b);
     if (order.both) return distance(placed(a), placed(b), options, start);
     const ShapeAndCollider bodies(order.isSwapped ? b : a, order.isSwapped ? a : b);
-    const double limit = searchLimit(options, sizeOf(bodies.b)) / double(bodies.b.scale);
+    const double limit = searchLimit(options, sizeOf(bodies)) / double(bodies.b.scale);
     DistanceStart own;
     if (start) own.triangleB = order.isSwapped ? start->triangleA : start->triangleB;
     const auto& shape = bodies.a.shape.data().shape;

@@ -7,8 +7,8 @@
 //   none if unknown. An open surface has no such function;
 // - bool isNear(from, to, radius): whether a sphere may come near on a straight path.
 //
-// Only a FieldSurface takes a radius above zero. All surfaces with an inside take a path without length: its point is
-// then tested to be inside.
+// Only the entry() and depenetration() of a FieldSurface take a radius above zero. All surfaces with an inside take a
+// path without length: entry() then finds whether its point is inside.
 // Tested by tests/collider/time_of_impact.cpp through timeOfImpact().
 #pragma once
 

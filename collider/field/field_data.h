@@ -104,23 +104,6 @@ struct FieldData : FieldLayout {
         return float(Clearance::cellSide) * coarse.around(local / double(Clearance::cellSide));
     }
 
-    /// The field's answer to the side of a point.
-    struct Side {
-        bool inside, certain;
-        float distance;  ///< of the nearest voxel if that is certain, else of the sample [m]
-    };
-    std::ptrdiff_t nearestVoxel(const glm::dvec3& local) const;
-    void fetchSide(const glm::dvec3& local) const;
-    Side sideAt(const glm::dvec3& local) const;
-    struct Probes {
-        float outer, inner;  ///< samples [m]
-    };
-    Probes probesAt(const glm::dvec3& place, const glm::dvec3& normal) const;
-    bool divides(const glm::dvec3& place, const glm::dvec3& normal) const;
-    bool isNextToWall(const NearestFeature& nearest, const glm::vec3& point) const;
-    bool confirms(const NearestFeature& nearest, const Side& side) const;
-    bool isBehind(const NearestFeature& nearest, const Side& side, const glm::vec3& point) const;
-    bool isInside(const NearestFeature& nearest, const glm::vec3& point) const;
     float boundOf(float maxDistance) const;
     std::uint32_t orBeyond(std::uint32_t piece, const EntryPlace& place, const glm::vec3& point,
                            float maxDistance) const;

@@ -14,6 +14,7 @@
 #include "collider/field/box_overlaps.h"
 #include "collider/field/field_data.h"
 #include "collider/field/interpolant.h"
+#include "collider/field/side_query.h"
 #include "collider/field/zero_set.h"
 
 namespace bilayer {
@@ -58,7 +59,7 @@ bool meetsSurface(const FieldData& field, const OrientedBox& box) {
 bool FieldData::inside(const glm::vec3& point) const {
     const glm::dvec3 local = toLocal(point);
     if (!mesh) return sample(local).distance < 0;
-    const Side side = sideAt(local);
+    const FieldSide side = SideQuery(*this).at(local);
     return side.certain ? side.inside : closest(point, std::numeric_limits<float>::infinity()).distance < 0;
 }
 

@@ -78,9 +78,9 @@ glm::dvec3 MeshTree::approached(const glm::dvec3& point) const noexcept {
     return detail::approached(point, lower, upper, maxDistance, clampedDistance);
 }
 
-NearestFeature MeshTree::featureOfPiece(std::uint32_t part, const glm::dvec3& point) const noexcept {
-    const WideLeaf& leaf = tree_.leaves[part / treeWidth];
-    const std::uint32_t i = part % treeWidth, triangle = leaf.triangles[i];
+NearestFeature MeshTree::featureOfPiece(std::uint32_t piece, const glm::dvec3& point) const noexcept {
+    const WideLeaf& leaf = tree_.leaves[piece / treeWidth];
+    const std::uint32_t i = piece % treeWidth, triangle = leaf.triangles[i];
     const auto vectorOf = [i](const float(&v)[3][treeWidth]) { return glm::dvec3(v[0][i], v[1][i], v[2][i]); };
     const glm::dvec3 from = toTree(point) - vectorOf(leaf.cell) - vectorOf(leaf.corner);
     const glm::dvec3 along = vectorOf(leaf.along), normal = vectorOf(leaf.normal);

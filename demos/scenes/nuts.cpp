@@ -202,10 +202,10 @@ Outcome nuts(const NutsOptions& options) {
     Stage stage(fmt::format("{} nuts on their bolts", options.pairs),
                 {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
-    const PrototypeOptions prototypes{
+    const PrototypeOptions prototypeOptions{
         .voxelSize = options.voxelSize, .margin = margin, .speculative = false, .accuracy = ContactAccuracy::exact};
-    const auto bolt = makePrototype(std::move(parts.bolt), prototypes);
-    const auto nut = makePrototype(std::move(parts.nut), prototypes);
+    const auto bolt = makePrototype(std::move(parts.bolt), prototypeOptions);
+    const auto nut = makePrototype(std::move(parts.nut), prototypeOptions);
     const float mass = density * float(massProperties(nut->mesh).volume);
 
     const int side = int(std::ceil(std::sqrt(float(options.pairs))));

@@ -78,23 +78,23 @@ bool hasFactoryPeg(const std::filesystem::path& folder) {
 Outcome pegs(const PegsOptions& options) {
     Stage stage("Pegs in holes", {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
-    const PrototypeOptions prototypes{
+    const PrototypeOptions prototypeOptions{
         .voxelSize = options.voxelSize, .margin = margin, .accuracy = ContactAccuracy::exact};
     const shapes::HoledBlock blockPart;
-    const auto block = makePrototype(shapes::holedBlock(blockPart), prototypes);
+    const auto block = makePrototype(shapes::holedBlock(blockPart), prototypeOptions);
     const float mouth = blockPart.height / 2, floor = blockPart.floor - mouth;
 
     std::vector<Lane> lanes;
     for (const float clearance : options.clearances)
         lanes.push_back({fmt::format("{:g} mm", 1e3f * clearance), clearance, block,
-                         makePrototype(shapes::peg({.clearance = clearance}), prototypes), mouth, options.offset,
+                         makePrototype(shapes::peg({.clearance = clearance}), prototypeOptions), mouth, options.offset,
                          options.tilt});
     std::shared_ptr<const BodyPrototype> table;
     if (!options.factory.empty()) {
         const Mesh plate = shapes::moved(readMesh(options.factory / factoryPlate), {0, 0, floor});
         const Mesh peg = shapes::moved(readMesh(options.factory / factoryPeg), {0, 0, -shapes::Peg{}.length / 2});
-        lanes.push_back({"Factory", factoryClearance, makePrototype(plate, prototypes), makePrototype(peg, prototypes),
-                         bounds(plate).upper.z, 0, factoryTilt});
+        lanes.push_back({"Factory", factoryClearance, makePrototype(plate, prototypeOptions),
+                         makePrototype(peg, prototypeOptions), bounds(plate).upper.z, 0, factoryTilt});
         const glm::vec3 half(blockPart.width / 2, blockPart.width / 2, tableThickness / 2);
         table = makePrototype(shapes::box(half), std::make_shared<btBoxShape>(btVector3(half.x, half.y, half.z)),
                               options.voxelSize);

@@ -134,7 +134,7 @@ void Basin::place(const fluid::Solid& solid) {
 
 void Basin::extendBehindWalls(FloatGrid& liquid) const {
     const FloatGrid::Ptr before = liquid.deepCopy();
-    continueInBody(liquid, *before);
+    extendInBody(liquid, *before);
     const auto known = liquid.getConstAccessor();
     auto values = liquid.getAccessor();
     const CoordBBox whole = withWalls(box_);
@@ -150,7 +150,7 @@ void Basin::extendBehindWalls(FloatGrid& liquid) const {
 
 // Extends a level set into the body's skin by its slope along the normal outside, so that it may meet the body at any
 // angle.
-void Basin::continueInBody(FloatGrid& liquid, const FloatGrid& before) const {
+void Basin::extendInBody(FloatGrid& liquid, const FloatGrid& before) const {
     const double voxel = liquid.voxelSize()[0];
     const float far = liquid.background();
     const auto known = before.getConstAccessor(), distance = solid_.distance->getConstAccessor();

@@ -37,7 +37,7 @@ class Basin {
 
   private:
     openvdb::Vec3SGrid::Ptr nextToWalls(const openvdb::Vec3SGrid& bodyVelocity) const;
-    void continueInBody(openvdb::FloatGrid& liquid, const openvdb::FloatGrid& before) const;
+    void extendInBody(openvdb::FloatGrid& liquid, const openvdb::FloatGrid& before) const;
     void slideAlongBody(FaceVelocity& velocity) const;
 
     openvdb::CoordBBox box_;

@@ -72,11 +72,11 @@ struct SeedReport {
 ///
 /// Throws std::invalid_argument for
 /// - a grid that is no level set, whose voxels are not cubes or mirrored, or whose band is narrower than 3 voxels;
-/// - a placement with a number that is not finite, a rotation that is not of unit length, or a scale that is not
-/// positive;
+/// - a placement with a number that is not finite, a rotation that is not of unit length, or a scale below or at zero;
 /// - a mesh with a hole wider than two voxels, or without an inside;
 /// - a body so thin that it would lie between the voxels at some position of them;
 /// - everything that build() refuses, such as a band of more memory than the machine has.
+///
 /// Throws std::runtime_error if no level set of this voxel size could be made, and Cancelled. The grid is then
 /// unchanged.
 SeedReport seed(openvdb::FloatGrid& liquid, const Mesh& mesh, const Placement& placement = {},

@@ -96,11 +96,11 @@ class Splitter {
 
     // Equals std::nth_element, but without unpredictable branches.
     static void select(TreeItem* begin, TreeItem* middle, TreeItem* end, int axis) {
-        const auto inParallel = [axis](const TreeItem& a, const TreeItem& b) { return less(a, b, axis); };
+        const auto isBefore = [axis](const TreeItem& a, const TreeItem& b) { return less(a, b, axis); };
         for (int round = 0; round < maxRounds && end - begin > shortRun; ++round) {
             // all items differ, so at least one is less than the median of three
             std::array<TreeItem, 3> some{*begin, begin[(end - begin) / 2], end[-1]};
-            std::sort(some.begin(), some.end(), inParallel);
+            std::sort(some.begin(), some.end(), isBefore);
             TreeItem* store = begin;
             for (TreeItem* i = begin; i < end; ++i) {
                 // copied as whole vectors: a load that spans several recent smaller stores would stall
@@ -112,7 +112,7 @@ class Splitter {
             }
             (middle < store ? end : begin) = store;
         }
-        std::nth_element(begin, middle, end, inParallel);
+        std::nth_element(begin, middle, end, isBefore);
     }
 
     void split(std::size_t begin, std::size_t end, std::size_t size) {

@@ -47,8 +47,8 @@ void checkFieldOf(const LevelSet& field, const Mesh& mesh, const BuildOptions& o
         refuse(fmt::format("is of the method '{}', and the options have '{}'", field.method(), nameOf(options.method)));
     if (options.triangles && !field.grids().triangle) refuse("lacks the nearest triangles");
     if (field.meshHash() != hash(mesh))
-        refuse(
-            fmt::format("is of another mesh: its hash is {:x}, that of this one {:x}", field.meshHash(), hash(mesh)));
+        refuse(fmt::format("is of another mesh: its hash is {:016x}, that of this one {:016x}", field.meshHash(),
+                           hash(mesh)));
     if (field.origin() != mesh.origin) refuse("has another origin than the mesh");
 }
 

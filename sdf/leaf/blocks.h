@@ -51,7 +51,7 @@ struct FillParameters {
 
 /// A batch of filled blocks. Distances are in voxels. The double layer method signs them by Eq. 3 of the paper, and
 /// stores +infinity where they are unknown. The exact methods sign them by the mesh, and store +-farAway beyond the
-/// reach. Those of a flood have no sign yet.
+/// reach. Without MeshJob::sign, as for winding numbers and a flood, all are positive.
 struct FilledBlocks {
     std::span<const glm::ivec3> origins;      ///< index coordinates of each block's first voxel
     std::span<const float> distances;         ///< blockVoxels per block

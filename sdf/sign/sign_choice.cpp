@@ -151,7 +151,7 @@ Mesh orientedMesh(const LevelSet& levelSet, Mesh mesh) {
     validate(mesh);
     if (levelSet.meshHash() != 0 && levelSet.meshHash() != hash(mesh))
         throw std::invalid_argument(
-            fmt::format("the level set is of another mesh: its hash is {:x}, that of this one {:x}",
+            fmt::format("the level set is of another mesh: its hash is {:016x}, that of this one {:016x}",
                         levelSet.meshHash(), hash(mesh)));
     if (levelSet.origin() != mesh.origin)
         throw std::invalid_argument("the level set has another origin than the mesh: one of them was moved");

@@ -134,14 +134,15 @@ Mesh ring() {
     return shapes::torus(0.3f, 0.12f, 16, 10);
 }
 
-std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, ContactAccuracy measure) {
-    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.accuracy = measure});
+std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, ContactAccuracy accuracy) {
+    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.accuracy = accuracy});
 }
 
 // The other shape of a query, and its triangles.
 class Other {
   public:
-    Other(int kind, Random& random, ContactAccuracy measure) : triangles_(ring()), field_(colliderOf(ring(), measure)) {
+    Other(int kind, Random& random, ContactAccuracy accuracy)
+        : triangles_(ring()), field_(colliderOf(ring(), accuracy)) {
         for (float& height : heights_) height = float(random(-0.1, 0.1));
         terrain_ = std::make_unique<btHeightfieldTerrainShape>(side, side, heights_.data(), 1, -0.1f, 0.1f, 2,
                                                                PHY_FLOAT, false);
@@ -192,14 +193,14 @@ btTransform anywhere(Random& random, double reach) {
 
 TEST_CASE("Contact tests between concave bodies return the distance of their meshes") {
     const int kind = GENERATE(range(0, 4)), other = GENERATE(range(0, 4));
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = seed();
-    CAPTURE(kind, other, nameOf(measure), start);
+    CAPTURE(kind, other, nameOf(accuracy), start);
     Random random(start);
     const Mesh mesh = bodyOf(kind);
-    Shape field(colliderOf(mesh, measure));
-    const Other it(other, random, measure);
+    Shape field(colliderOf(mesh, accuracy));
+    const Other it(other, random, accuracy);
     World world;
     btCollisionObject a, b;
     a.setCollisionShape(&field);
@@ -221,7 +222,7 @@ TEST_CASE("Contact tests between concave bodies return the distance of their mes
     CHECK(found > 0);
 }
 
-TEST_CASE("Contact tests that ask for no distance measure the depth by the triangles, in a groove") {
+TEST_CASE("Contact tests that ask for no distance accuracy the depth by the triangles, in a groove") {
     const unsigned start = seed();
     CAPTURE(start);
     Random random(start);
@@ -253,13 +254,13 @@ TEST_CASE("Contact tests return the distance of round bodies that nearly touch e
     const float radius = GENERATE(2.f, 3.f, 5.f, 9.f) * voxel;
     const float gap = GENERATE(0.5f, 0.1f, 0.001f) * voxel;
     const bool overPlane = GENERATE(false, true);
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = seed();
-    CAPTURE(radius / voxel, gap / voxel, overPlane, nameOf(measure), start);
+    CAPTURE(radius / voxel, gap / voxel, overPlane, nameOf(accuracy), start);
     Random random(start);
     const Mesh ball = shapes::sphere(radius, 4);
-    Shape field(colliderOf(ball, measure));
+    Shape field(colliderOf(ball, accuracy));
     btStaticPlaneShape plane({0, 0, 1}, 0);
     World world;
     btCollisionObject a, b;

@@ -62,8 +62,8 @@ btTransform transformOf(const Pose& pose) {
 
 using Collide = std::function<std::vector<Contact>(const Crossing&, float)>;
 
-Collide collideBars(int kind, ContactAccuracy measure) {
-    const auto field = deepCollider(shapes::box(bar), h, measure);
+Collide collideBars(int kind, ContactAccuracy accuracy) {
+    const auto field = deepCollider(shapes::box(bar), h, accuracy);
     if (kind == 0)
         return [=](const Crossing& c, float margin) {
             std::vector<Contact> contacts;
@@ -98,11 +98,11 @@ Collide collideBars(int kind, ContactAccuracy measure) {
 
 TEST_CASE("Crossing edges are in contact where they cross, wherever their sample points are") {
     const int kind = GENERATE(0, 1, 2, 3);
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = seed();
-    CAPTURE(kind, nameOf(measure), start);
-    const Collide collide = collideBars(kind, measure);
+    CAPTURE(kind, nameOf(accuracy), start);
+    const Collide collide = collideBars(kind, accuracy);
     std::mt19937 random(start);
     std::uniform_real_distribution<float> gaps(-0.6f * h, 0.4f * h);
     for (int i = 0; i < 200; ++i) {
@@ -117,11 +117,11 @@ TEST_CASE("Crossing edges are in contact where they cross, wherever their sample
 
 TEST_CASE("A contact on an edge moves as smoothly as the sliding edge") {
     const int kind = GENERATE(0, 1, 2, 3);
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = seed();
-    CAPTURE(kind, nameOf(measure), start);
-    const Collide collide = collideBars(kind, measure);
+    CAPTURE(kind, nameOf(accuracy), start);
+    const Collide collide = collideBars(kind, accuracy);
     std::mt19937 random(start);
     for (int run = 0; run < 10; ++run) {
         Crossing crossing = crossingOf(random, -0.2f * h);
@@ -273,9 +273,9 @@ TEST_CASE("Convex vertices below faces have the right penetration depth, and eac
 
 TEST_CASE("No contact is much deeper than the penetration depth of the bodies, whichever edges cross") {
     const unsigned start = seed();
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
-    CAPTURE(start, nameOf(measure));
+    CAPTURE(start, nameOf(accuracy));
     std::mt19937 random(start);
     std::normal_distribution<float> normal;
     const std::vector<Mesh> meshes{shapes::box({0.5f, 0.4f, 0.3f}, 3), shapes::cone(0.4f, 0.9f, 48),
@@ -283,7 +283,7 @@ TEST_CASE("No contact is much deeper than the penetration depth of the bodies, w
     std::vector<std::shared_ptr<const Collider>> colliders;
     std::vector<demo::Specimen> specimens;
     for (const Mesh& mesh : meshes) {
-        colliders.push_back(deepCollider(mesh, h, measure));
+        colliders.push_back(deepCollider(mesh, h, accuracy));
         specimens.emplace_back(mesh, 0.5 * double(h));
     }
     const TriangleShape triangles[] = {TriangleShape(meshes[0]), TriangleShape(meshes[1]), TriangleShape(meshes[2])};

@@ -188,16 +188,16 @@ TEST_CASE("Bodies with vertices and edges come to rest in a groove of triangles 
 
 TEST_CASE("Thin bodies rest on triangles, and their far side does not pull them through") {
     const float degrees = GENERATE(5.f, 10.f, 20.f), voxel = GENERATE(0.02f, 0.01f);
-    const ContactAccuracy measure = GENERATE(ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
+    const ContactAccuracy accuracy = GENERATE(ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned seed = test::seed();
-    CAPTURE(degrees, voxel, nameOf(measure), seed);
+    CAPTURE(degrees, voxel, nameOf(accuracy), seed);
     Random random(seed);
     const float half = glm::radians(0.5f * degrees), y = 0.3f, z = y * std::tan(half);
     Mesh wedge;
     wedge.points = {{-0.4f, 0, 0}, {0.4f, 0, 0}, {0.4f, y, z}, {-0.4f, y, z}, {0.4f, y, -z}, {-0.4f, y, -z}};
     wedge.triangles = {{0, 3, 2}, {0, 2, 1}, {0, 1, 4}, {0, 4, 5}, {3, 5, 4}, {3, 4, 2}, {0, 5, 3}, {1, 2, 4}};
     const auto collider =
-        std::make_shared<Collider>(wedge, build(wedge, {.voxelSize = voxel}), ColliderOptions{.accuracy = measure});
+        std::make_shared<Collider>(wedge, build(wedge, {.voxelSize = voxel}), ColliderOptions{.accuracy = accuracy});
     const Pose frame = bullet::centreOfMassFrame(*collider);
     Shape shape(collider, {.frame = frame});
     Mesh sheet;

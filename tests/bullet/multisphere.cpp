@@ -108,8 +108,8 @@ TEST_CASE("Balls rest in a groove at the depth of its two faces") {
         mesh.triangles.push_back({t.x, t.z, t.y});
         mesh.triangles.push_back(t + 5u);
     }
-    const auto deepestWith = [&](ContactAccuracy measure, float radius) {
-        const auto groove = deepCollider(mesh, h, measure);
+    const auto deepestWith = [&](ContactAccuracy accuracy, float radius) {
+        const auto groove = deepCollider(mesh, h, accuracy);
         btSphereShape ball(radius);
         std::vector<Contact> contacts;
         const Pose lying{bottom + glm::vec3(0, 0, std::sqrt(2.f) * radius)};

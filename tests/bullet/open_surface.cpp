@@ -86,15 +86,15 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
 
 TEST_CASE("A corner has the same depth below triangles as below their plane, in any orientation") {
     const unsigned start = seed();
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const bool asTerrain = GENERATE(false, true);
     const float depth = h * GENERATE(-0.5f, 0.05f, 0.2f, 0.5f);
-    CAPTURE(start, nameOf(measure), asTerrain, depth / h);
+    CAPTURE(start, nameOf(accuracy), asTerrain, depth / h);
     std::mt19937 random(start);
     std::normal_distribution<float> normal;
     const glm::vec3 half(0.5f, 0.4f, 0.3f);
-    const auto box = deepCollider(shapes::box(half, 3), h, measure);
+    const auto box = deepCollider(shapes::box(half, 3), h, accuracy);
     const float heights[4] = {};
     btHeightfieldTerrainShape terrain(2, 2, heights, 1, -1, 1, 2, PHY_FLOAT, false);
     terrain.setLocalScaling({6, 6, 1});
@@ -125,14 +125,14 @@ TEST_CASE("A corner has the same depth below triangles as below their plane, in 
 
 TEST_CASE("A vertex below a crease of triangles has the depths of both faces") {
     const unsigned start = seed();
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const float cell = GENERATE(0.7f, 20.f);  // [voxels]
-    CAPTURE(start, nameOf(measure), cell);
+    CAPTURE(start, nameOf(accuracy), cell);
     std::mt19937 random(start);
     std::uniform_real_distribution<float> any(-1, 1);
     const float height = 1, slope = 0.6f;
-    const auto cone = deepCollider(shapes::cone(0.3f, height, 12), h, measure);
+    const auto cone = deepCollider(shapes::cone(0.3f, height, 12), h, accuracy);
     const TriangleShape groove(grooveOf(slope, cell * h, cell > 1 ? 2 : 20));
     const glm::vec3 left = glm::normalize(glm::vec3(slope, 0, 1)), right = glm::normalize(glm::vec3(-slope, 0, 1));
     for (int run = 0; run < 50; ++run) {

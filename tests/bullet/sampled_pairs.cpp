@@ -26,10 +26,10 @@ using namespace bilayer::test;
 namespace {
 
 std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, float voxels,
-                                           ContactAccuracy measure = ContactAccuracy::exactNearFeatures) {
+                                           ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures) {
     const float voxel = voxelSizeFor(mesh, voxels);
     return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidthVoxels = 5}),
-                                      ColliderOptions{.accuracy = measure});
+                                      ColliderOptions{.accuracy = accuracy});
 }
 
 std::vector<std::shared_ptr<const Collider>> someColliders() {

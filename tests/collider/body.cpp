@@ -161,11 +161,11 @@ TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
     CAPTURE(seed);
     Random random(seed);
     const float h = 0.03f;
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
-    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.accuracy = measure}),
-        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.accuracy = measure});
-    CHECK((knot.loaded.field().mesh() != nullptr) == (measure != ContactAccuracy::samples));
+    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.accuracy = accuracy}),
+        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.accuracy = accuracy});
+    CHECK((knot.loaded.field().mesh() != nullptr) == (accuracy != ContactAccuracy::samples));
     std::size_t found = 0;
     for (int i = 0; i < 200; ++i) {
         const Pose a{random.point(0.5), glm::angleAxis(float(random(0, 6.28)), random.direction())};
@@ -236,15 +236,6 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     body.mesh.reset();
     REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mesh);
     REQUIRE(bodyOf(withBody(stored(), body)).accuracy == ContactAccuracy::samples);
-}
-
-TEST_CASE("the words of version 0.1 for a contact accuracy are read") {
-    for (const auto& [word, accuracy] : {std::pair{"edges", ContactAccuracy::exactNearFeatures},
-                                         {"triangles", ContactAccuracy::exact},
-                                         {"exact-near-features", ContactAccuracy::exactNearFeatures},
-                                         {"exact", ContactAccuracy::exact},
-                                         {"samples", ContactAccuracy::samples}})
-        REQUIRE(bodyOf(changed(setting("bilayer:measure", std::string(word)))).accuracy == accuracy);
 }
 
 TEST_CASE("a field alone is no body") {

@@ -38,17 +38,17 @@ TEST_CASE("margins that are not finite, or too large for the body, are rejected"
 }
 
 TEST_CASE("a body of a mesh that faces the wrong way is the body of the right one") {
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const bool isShuffled = GENERATE(false, true);
-    CAPTURE(nameOf(measure), isShuffled);
+    CAPTURE(nameOf(accuracy), isShuffled);
     const Mesh mesh = shapes::torus(0.35f, 0.13f);
     Mesh wrong = shapes::flipped(mesh);
     Random random(test::seed());
     if (isShuffled)
         for (glm::uvec3& t : wrong.triangles)
             if (random(0, 1) < 0.5) std::swap(t.y, t.z);
-    const ColliderOptions options{.accuracy = measure};
+    const ColliderOptions options{.accuracy = accuracy};
     const Collider right(mesh, build(mesh, {.voxelSize = h}), options),
         repaired(wrong, build(wrong, {.voxelSize = h}), options);
     CHECK(repaired.mass().volume == Approx(right.mass().volume));

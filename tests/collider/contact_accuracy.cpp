@@ -24,16 +24,16 @@ using namespace bilayer::detail;
 using namespace bilayer::test;
 
 TEST_CASE("beyond the band, edges have the distance of the triangles' edges, and normals across both") {
-    const ContactAccuracy measure =
+    const ContactAccuracy accuracy =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const float gap = GENERATE(0.03f, 0.05f, 0.06f, 0.1f, 0.25f);
     const float scale = GENERATE(1.f, 10.f);
     const bool crosses = GENERATE(false, true);
-    CAPTURE(nameOf(measure), gap, scale, crosses);
+    CAPTURE(nameOf(accuracy), gap, scale, crosses);
     // edge descent starts from points in contact
     const float beyond = crosses ? 0.02f : 0.001f;
     const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
-    const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.accuracy = measure});
+    const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.accuracy = accuracy});
     const float half = std::sqrt(0.5f), sideways = half * gap, quarter = glm::pi<float>() / 4;
     // an edge next to and above another one, or above and across it
     Pose upper{{0.6f + sideways, 0.01f, 0.2f + sideways}}, lower;
@@ -95,10 +95,10 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
     struct Errors {
         double distance = 0, foot = 0;
     };
-    const auto errors = [&](ContactAccuracy measure, const Pose& pose) {
+    const auto errors = [&](ContactAccuracy accuracy, const Pose& pose) {
         std::vector<Collider> parts;
         for (const Mesh& mesh : meshes)
-            parts.emplace_back(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.accuracy = measure});
+            parts.emplace_back(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.accuracy = accuracy});
         const Pose poses[] = {pose, {}};
         std::vector<Contact> contacts;
         collide(parts[0], pose, parts[1], {}, {.margin = voxel / 2}, contacts);

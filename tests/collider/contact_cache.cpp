@@ -98,10 +98,10 @@ TEST_CASE("bodies that rest next to each other cost little, those that touch lit
         return collide(a, b, test::unfiltered(h), contacts).pointsTested;
     };
     std::vector<Contact> contacts;
-    const Placed next{brick(), {{-0.2f, 0, 0.375f}}}, touching{brick(), {{-0.2f, 0, 0.305f}}};
-    const std::uint32_t nextAtRest = testedAtRest(next, contacts);
+    const Placed apart{brick(), {{-0.2f, 0, 0.375f}}}, touching{brick(), {{-0.2f, 0, 0.305f}}};
+    const std::uint32_t apartAtRest = testedAtRest(apart, contacts);
     CHECK(contacts.empty());
-    CHECK(nextAtRest < testedAnew(next) / 4);
+    CHECK(apartAtRest < testedAnew(apart) / 4);
     const std::uint32_t touchingAtRest = testedAtRest(touching, contacts);
     CHECK(contacts.size() > 20);
     CHECK(touchingAtRest < 4 * contacts.size());

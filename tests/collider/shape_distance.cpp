@@ -237,7 +237,25 @@ TEST_CASE("Shapes that overlap a collider are distinguished from those inside it
     }
 }
 
-TEST_CASE("Planes and sheets of triangles have the distance of the lowest vertex of a body") {
+TEST_CASE("A limit of zero finds a small collider that touches a large shape") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Collider& block = colliders()[1];
+    for (int i = 0; i < 100; ++i) {
+        CAPTURE(i);
+        const auto depth = float(random(0, 1e-4));
+        const Pose pose = randomPoseAt(random, 2);
+        const float size = 500, top = block.bounds().upper.z;
+        // the block's upper face, against the lower face of a large box
+        const PlacedShape ground{
+            ContactShape::box(glm::vec3(size)),
+            {pose.toWorld({random(-100, 100), random(-100, 100), top + size - depth}), pose.rotation}};
+        CHECK(distance(ground, {ContactShape(block), pose}, {.maxDistance = 0}).found);
+    }
+}
+
+TEST_CASE("Planes and open surfaces have the distance of the lowest vertex of a body") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

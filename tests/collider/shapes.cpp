@@ -40,7 +40,7 @@ const ContactShape& block() {
 }
 
 /// Waves of triangles over the xy plane, as a height field of cells.
-OpenSurface flatSheet() {
+OpenSurface flatSurface() {
     return {[](const Bounds& box, const OpenSurface::Visitor& visitor) {
         constexpr float cell = 0.23f;
         constexpr int count = 8;
@@ -138,12 +138,12 @@ TEST_CASE("Shapes that stand on a box touch it at their lowest points, in either
         }
 }
 
-TEST_CASE("A box lies on planes and sheets of triangles") {
+TEST_CASE("A box rests on planes and open surfaces") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     const std::pair<std::string, ContactShape> grounds[] = {{"plane", ContactShape::plane({0, 0, 2.5f}, 0)},
-                                                            {"sheet", ContactShape::triangles(flatSheet())}};
+                                                            {"sheet", ContactShape::triangles(flatSurface())}};
     for (const auto& [name, ground] : grounds)
         for (const float gap : {-0.6f * h, 0.f, 0.7f * h}) {
             const Pose world{3.f * random.direction(), glm::angleAxis(float(random(0, 3)), random.direction())};

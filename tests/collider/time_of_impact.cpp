@@ -40,7 +40,7 @@ Placed after(const Placed& body, double fraction) {
 }
 
 /// A square of two triangles at z = 0.
-OpenSurface squareSheet() {
+OpenSurface squareSurface() {
     return {[](const Bounds& box, const OpenSurface::Visitor& visitor) {
         if (box.lower.z > 0 || box.upper.z < 0) return;
         visitor({glm::vec3(-9, -9, 0), {9, -9, 0}, {9, 9, 0}}, 0);
@@ -50,7 +50,7 @@ OpenSurface squareSheet() {
 
 /// Two rectangles that meet at x = 0 and z = 0.
 /// @param left, right  heights at x = -9 and x = 9
-OpenSurface bentSheet(float left, float right) {
+OpenSurface bentSurface(float left, float right) {
     const std::array<Triangle, 4> triangles{Triangle{glm::vec3(-9, -9, left), {0, -9, 0}, {0, 9, 0}},
                                             {glm::vec3(-9, -9, left), {0, 9, 0}, {-9, 9, left}},
                                             {glm::vec3(0, -9, 0), {9, -9, right}, {9, 9, right}},
@@ -162,7 +162,7 @@ TEST_CASE("Bodies in contact rest, slide and part without penetration, and penet
     const float half = 0.3f;
     const Collider block = colliderOf(shapes::box({half, half, half}));
     const float voxel = block.field().voxelSize();
-    const OpenSurface floor = squareSheet();
+    const OpenSurface floor = squareSurface();
     const ContactShape box = ContactShape::box({9, 9, 1}), field(colliderOf(shapes::box({3, 3, 1})));
     const PlacedShape grounds[] = {{field, {{0, 0, -1}}},
                                    {box, {{0, 0, -1}}},
@@ -209,7 +209,7 @@ TEST_CASE("Bodies that have passed a surface by less than a voxel move on along 
     const float half = 0.3f;
     const Collider block = colliderOf(shapes::box({half, half, half}));
     const float voxel = block.field().voxelSize();
-    const OpenSurface floor = squareSheet();
+    const OpenSurface floor = squareSurface();
     const PlacedShape grounds[] = {{ContactShape::plane({0, 0, 1}, 0)}, {ContactShape::triangles(floor)}};
     for (const PlacedShape& ground : grounds)
         for (int round = 0; round < 40; ++round) {
@@ -246,6 +246,25 @@ TEST_CASE("Bodies that have passed a surface by less than a voxel move on along 
         }
 }
 
+TEST_CASE("A body that is pressed into the ground step by step does not get deeper for ever") {
+    const float half = 0.3f;
+    const Collider block = colliderOf(shapes::box({half, half, half}));
+    const float voxel = block.field().voxelSize();
+    const OpenSurface floor = squareSurface();
+    const PlacedShape grounds[] = {{ContactShape::plane({0, 0, 1}, 0)}, {ContactShape::triangles(floor)}};
+    for (const PlacedShape& ground : grounds)
+        for (const float start : {0.f, 0.27f, 0.3f, 0.4f}) {
+            CAPTURE(&ground - grounds, start);
+            PlacedShape body{ContactShape(block), {{0.01f, 0.02f, half - start * voxel}}};
+            body.motion.displacement = {0, 0, -0.09f * voxel};
+            for (int step = 0; step < 50; ++step) {
+                const Impact impact = timeOfImpact(body, ground, {.penetration = true});
+                body.pose = impact.found ? impact.poseA : Pose{body.pose.position + body.motion.displacement};
+            }
+            CHECK((half - body.pose.position.z) / voxel < 0.5f);
+        }
+}
+
 TEST_CASE("A ball that rolls into the ground is stopped next to the place where it enters") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
@@ -253,7 +272,7 @@ TEST_CASE("A ball that rolls into the ground is stopped next to the place where 
     const float radius = 0.1f, voxel = radius / 32;
     const Mesh sphere = shapes::sphere(radius, 5);
     const ContactShape ball(Collider(sphere, build(sphere, {.voxelSize = voxel})));
-    const OpenSurface floor = squareSheet();
+    const OpenSurface floor = squareSurface();
     const PlacedShape grounds[] = {{ContactShape(colliderOf(shapes::box({3, 3, 1}))), {{0, 0, -1}}},
                                    {ContactShape::box({9, 9, 1}), {{0, 0, -1}}},
                                    {ContactShape::plane({0, 0, 1}, 0)},
@@ -284,7 +303,7 @@ TEST_CASE("A body that slides towards a crease of triangles is stopped in front 
     for (int round = 0; round < 200; ++round) {
         // flat for negative x, a slope for positive x
         const float rise = 9 * std::tan(float(random(0.1, 0.4)));
-        const OpenSurface sheet = bentSheet(0, rise);
+        const OpenSurface sheet = bentSurface(0, rise);
         const PlacedShape ground{ContactShape::triangles(sheet)};
         PlacedShape body{ContactShape(block)};
         const float depth = float(random(0, 0.8)), height = float(random(0, 0.2));
@@ -312,7 +331,7 @@ TEST_CASE("A body that slides over a ridge of triangles is not stopped by the pl
     for (int round = 0; round < 200; ++round) {
         // a slope for negative x, flat for positive x
         const auto slope = float(random(0.02, 0.12));
-        const OpenSurface sheet = bentSheet(-9 * slope, 0);
+        const OpenSurface sheet = bentSurface(-9 * slope, 0);
         const glm::quat rotation = randomRotation(random);
         const PlacedShape ground{ContactShape::triangles(sheet), {{0, 0, 0}, rotation}};
         PlacedShape body{ContactShape(block), {{0, 0, 0}, rotation}};
@@ -335,7 +354,7 @@ TEST_CASE("A body that gets too deep beyond a ridge of triangles is stopped by t
         // A slope for negative x, flat for positive x. The block's lower front edge, which leads, enters the slope and
         // ends below the flat part.
         const auto slope = float(random(0.18, 0.22)), start = float(random(2.5, 3.2)), beyond = float(random(0.5, 1.2));
-        const OpenSurface sheet = bentSheet(-9 * slope, 0);
+        const OpenSurface sheet = bentSurface(-9 * slope, 0);
         const glm::quat rotation = randomRotation(random),
                         dive = glm::angleAxis(float(random(0.3, 0.6)), glm::vec3(0, 1, 0));
         const PlacedShape ground{ContactShape::triangles(sheet), {{0, 0, 0}, rotation}};

@@ -7,7 +7,7 @@ SAME = [
     ("0.50 s: height 0.1233 m, 20 contacts\n", "0.50 s: height 0.1234 m, 21 contacts\n"),
     ("distance  0.0000 m\n", "distance -0.0000 m\n"),
     ("active voxels  14,519\n", "active voxels   14,520\n"),
-    ("  build   0.193 s: tiles 0.017\n", "  build   7 s: tiles 1\n"),
+    ("  build   0.193 s: prepare 0.017\n", "  build   7 s: tiles 1\n"),
 ]
 DIFFERENT = [
     ("sign conflicts  0 pairs\n", "sign conflicts  2 pairs\n"),

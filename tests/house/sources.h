@@ -51,8 +51,8 @@ inline const std::vector<std::string> folders{"sdf",   "cl",    "collider", "int
                                               "tools", "demos", "bench",    "tests"};
 
 inline bool isSource(const fs::path& path) {
-    static const std::set<std::string> endings{".h", ".cpp", ".cl", ".py", ".sh", ".js", ".html", ".cmake", ".txt"};
-    return endings.count(path.extension().string()) > 0;
+    static const std::set<std::string> extensions{".h", ".cpp", ".cl", ".py", ".sh", ".js", ".html", ".cmake", ".txt"};
+    return extensions.count(path.extension().string()) > 0;
 }
 
 /// Calls visit(path, line number, line) for each line of all source files; paths are relative to the project.

@@ -143,7 +143,8 @@ def test_obstacle(tmp_path):
     ball = bilayer.sphere(0.5, subdivisions=4)
     obstacle = bilayer.obstacle(ball, 0.05, bilayer.Pose((1, 0, 0)), velocity=(0, 0, 3))
     shape = obstacle.distance.shape
-    assert obstacle.cell_fluid_fraction.shape == shape and obstacle.face_fluid_fraction.shape == obstacle.velocity.shape == shape + (3,)
+    assert obstacle.cell_fluid_fraction.shape == shape
+    assert obstacle.face_fluid_fraction.shape == obstacle.velocity.shape == shape + (3,)
     closed = (1 - obstacle.cell_fluid_fraction).sum() * 0.05**3
     assert closed == pytest.approx(bilayer.mass_properties(ball).volume, rel=0.01)
     index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)

@@ -232,6 +232,12 @@ TEST_CASE("voxels too small for OpenVDB, and too large for fields, are refused w
     CHECK(build(scaled, {.voxelSize = voxelSizeFor(scaled, 128)}).activeVoxels() > 0);
 }
 
+TEST_CASE("a band without a voxel is refused with its width") {
+    const Mesh mesh = shapes::moved(shapes::box(glm::vec3(0.2f)), glm::vec3(0.5f));
+    CHECK_THROWS_WITH(build(mesh, {.voxelSize = 1, .exteriorWidthVoxels = 0.01f, .interiorWidthVoxels = 0.02f}),
+                      Catch::Contains("no voxel of 1 m lies within the band, 0.01 voxels outside and 0.02 inside"));
+}
+
 TEST_CASE("bad options and meshes are refused by name") {
     const Mesh mesh = shapes::sphere(1, 2);
     const auto refused = [&](BuildOptions options, const std::string& name) {

@@ -17,6 +17,7 @@
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
+#include "sdf/tiles/hashed_record.h"
 #include "sdf/tiles/tile_columns.h"
 #include "sdf/tiles/tile_merge.h"
 #include "tests/sdf/union_solids.h"
@@ -246,6 +247,15 @@ TEST_CASE("files of column sums") {
     for (const std::size_t bytes : {0u, 15u, 20u}) {
         std::ofstream(path, std::ios::binary) << std::string(bytes, '\x01');
         CHECK_THROWS_WITH(readColumnSums(path), Contains("tile.sums"));
+    }
+    // more and fewer sums than the box has columns, and no box
+    for (const auto& [end, count] : {std::pair(glm::ivec2(3, 2), 7), {glm::ivec2(3, 2), 5}, {glm::ivec2(-1, -6), 6}}) {
+        HashedRecordWriter record;
+        record.add(glm::ivec2(0, 0));
+        record.add(end);
+        record.add(std::vector<std::int32_t>(std::size_t(count), 1));
+        record.write(path);
+        CHECK_THROWS_WITH(readColumnSums(path), Contains("tile.sums: is damaged"));
     }
     std::filesystem::remove(path);
     CHECK_THROWS_WITH(readColumnSums(path), Contains("tile.sums"));

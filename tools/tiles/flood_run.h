@@ -31,12 +31,12 @@ class FloodRun {
     /// Builds a tile.
     detail::BuiltTile build(std::size_t tile);
 
-    /// The cost of prepare().
+    /// What other tiles have cost.
     struct Exchange {
-        std::uint64_t bytes = 0;  ///< read of other tiles
-        double seconds = 0;
+        std::uint64_t bytes = 0;  ///< read of them
+        double seconds = 0;       ///< in prepare()
     };
-    /// Returns that since the last call.
+    /// Returns what has been added since the last call.
     Exchange takeExchange();
 
   private:

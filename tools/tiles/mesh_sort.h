@@ -20,7 +20,8 @@ class MeshSort {
 
     /// Replaces the plan.
     /// @param identity  of the field
-    /// @param round     count of earlier plans whose normals contradicted each other. Above 0, all tiles are removed
+    /// @param round     count of earlier plans whose normals contradicted each other. Above 0 and without `known`,
+    ///                  all tiles are removed
     /// @param known     the signs of tiles that are there and stay; or null
     /// Throws std::runtime_error if the mesh does not fit, and as decideSigns() does.
     void run(const Json& identity, int round, const PlannedSigns* known = nullptr);

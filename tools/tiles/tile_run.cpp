@@ -122,7 +122,7 @@ class TileRun {
             if (const SignCounts sum = sumOf(counts); judge(sum) != SignVerdict::right)
                 return planner_->planAgain(tiles, sum);
         if (std::all_of(records.begin(), records.end(), [](const Json& r) { return r.at("activeVoxels") == 0; }))
-            throw std::invalid_argument(noVoxelInBand(a_.options));
+            throw std::invalid_argument(noVoxelInBand(tiles.options));
         if (!signs.areByFlood()) joinSides(records, counts_);
         Json manifest = tiles.plan.manifest(records, ranks_.count);
         manifest["sum"]["estimatedBytes"] = std::uint64_t(std::max(tiles.largestNeed(), tiles.needOfRecords()));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes contacts into Bullet's manifolds, and carries impulses and friction anchors from step to step.
-// Tested by tests/bullet/manifolds.cpp through World.
+// Tested by tests/bullet/manifolds.cpp through btPersistentManifold.
 #pragma once
 
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds the triangle of a mesh or a height field that a contact touches, for example to look up a material; internal.
-// Tested by tests/bullet/triangle_ids.cpp through World.
+// Tested by tests/bullet/triangle_ids.cpp through btConcaveShape.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
