@@ -17,6 +17,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/accuracy_names.h"
 #include "sdf/base/method_names.h"
 #include "sdf/fill/double_layer.h"
 #include "sdf/sign/sign_choice.h"
@@ -33,10 +34,7 @@ namespace {
 // The words are part of the command line's contract.
 const std::map<std::string, Method> methods(methodNames.begin(), methodNames.end());
 const std::map<std::string, Sign> signs(signNames.begin(), signNames.end());
-const std::map<std::string, ContactAccuracy> contactAccuracies{
-    {nameOf(ContactAccuracy::samples), ContactAccuracy::samples},
-    {nameOf(ContactAccuracy::exactNearFeatures), ContactAccuracy::exactNearFeatures},
-    {nameOf(ContactAccuracy::exact), ContactAccuracy::exact}};
+const std::map<std::string, ContactAccuracy> contactAccuracies(accuracyNames.begin(), accuracyNames.end());
 const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::automatic},
                                                     {"block", KernelMapping::blockPerItem},
                                                     {"group", KernelMapping::groupPerBlock}};

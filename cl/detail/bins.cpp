@@ -79,8 +79,8 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
     queue.enqueueReadBuffer(total, CL_TRUE, 0, sizeof totals, totals.data(), nullptr,
                             timing.event(Timing::Command::download));
     const auto [bricks, entries, parts] = totals;
-    if (const cl_ulong most = std::max(entries, parts); most > std::numeric_limits<cl_uint>::max())
-        memory.refuse(most * sizeof(cl_uint), "the binning of the mesh");
+    if (const cl_ulong count = std::max(entries, parts); count > std::numeric_limits<cl_uint>::max())
+        memory.refuse(count * sizeof(cl_uint), "the binning of the mesh");
     list_ = bins(std::max<std::uint64_t>(1, entries) * sizeof(cl_uint));
     run("listTriangles", items, local, points_, triangles_, grid_, cursors, codes, list_);
     partOffsets_.resize(bricks + 1);

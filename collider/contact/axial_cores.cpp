@@ -70,6 +70,7 @@ RevolutionCore::RevolutionCore(int axis, float halfHeight, float lowerRadius, fl
     tolerance_ = tolerance(growth);
     const float sidePart = 2 * halfHeight / std::hypot(2 * halfHeight, upperRadius - lowerRadius);
     minSidePart_ = std::min(maxFlatPart, maxFlatFraction * sidePart);
+    maxSideCosine_ = std::sqrt(1 - minSidePart_ * minSidePart_);
 }
 
 void RevolutionCore::addRim(float height, float rim) {
@@ -124,7 +125,7 @@ bool RevolutionCore::isFlat(const NearestPoint& nearest) const {
 }
 
 bool RevolutionCore::isOnSide(const NearestPoint& nearest) const {
-    return std::abs(nearest.normal[axis_]) < std::sqrt(1 - minSidePart_ * minSidePart_);
+    return std::abs(nearest.normal[axis_]) < maxSideCosine_;
 }
 
 bool RevolutionCore::isRound(const NearestPoint& nearest) const {

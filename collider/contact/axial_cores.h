@@ -52,7 +52,8 @@ class RevolutionCore : public ConvexCore {
 
     int axis_;
     float halfHeight_, lowerRadius_, upperRadius_, tolerance_;
-    float minSidePart_;  ///< min part across the axis of a normal that does not belong to a flat end
+    float minSidePart_;    ///< min part across the axis of a normal that does not belong to a flat end
+    float maxSideCosine_;  ///< max cosine of the angle between such a normal and the axis
 };
 
 }  // namespace bilayer::detail

@@ -16,6 +16,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/accuracy_names.h"
 #include "collider/contact/stored_body.h"
 #include "collider/contact/stored_mesh.h"
 #include "collider/contact/stored_points.h"
@@ -178,13 +179,8 @@ void requireSame(const Bounds& ofMesh, const Bounds& ofBody) {
         refuseBody(fmt::format("'{}' and '{}' are not those of its mesh", entry::lower, entry::upper));
 }
 
-constexpr std::pair<ContactAccuracy, const char*> accuracyNames[] = {
-    {ContactAccuracy::samples, "samples"},
-    {ContactAccuracy::exactNearFeatures, "exact-near-features"},
-    {ContactAccuracy::exact, "exact"}};
-
 ContactAccuracy accuracyOf(const std::string& name) {
-    for (const auto& [accuracy, itsName] : accuracyNames)
+    for (const auto& [itsName, accuracy] : accuracyNames)
         if (name == itsName) return accuracy;
     refuseBody(fmt::format("the contact accuracy '{}' is {}; it must be samples, exact-near-features or exact",
                            entry::accuracy, quotedWord(name)));
@@ -289,7 +285,7 @@ namespace bilayer {
 using namespace detail;
 
 const char* nameOf(ContactAccuracy accuracy) {
-    for (const auto& [one, name] : accuracyNames)
+    for (const auto& [name, one] : accuracyNames)
         if (one == accuracy) return name;
     throw std::invalid_argument(fmt::format("{} is no contact accuracy", int(accuracy)));
 }

@@ -10,6 +10,7 @@
 
 #include <bilayer/collider/mass.h>
 
+#include "collider/contact/accuracy_names.h"
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
@@ -19,12 +20,6 @@
 
 namespace bilayer::python {
 namespace {
-
-std::pair<const char*, ContactAccuracy> named(ContactAccuracy accuracy) {
-    return {nameOf(accuracy), accuracy};
-}
-const std::array accuracies{named(ContactAccuracy::samples), named(ContactAccuracy::exactNearFeatures),
-                            named(ContactAccuracy::exact)};
 
 py::object toResult(const MassProperties& mass) {
     py::array_t<float> inertia({3, 3});
@@ -52,7 +47,8 @@ py::object massOf(const py::object& solid) {
 
 ColliderOptions optionsOf(float pointSpacing, std::optional<float> margin, const std::string& accuracy) {
     requirePositive(double(pointSpacing), "point_spacing_voxels");
-    ColliderOptions options{.pointSpacingVoxels = pointSpacing, .accuracy = byWord(accuracies, accuracy, "accuracy")};
+    ColliderOptions options{.pointSpacingVoxels = pointSpacing,
+                            .accuracy = byWord(bilayer::detail::accuracyNames, accuracy, "accuracy")};
     if (!margin) return options;
     requireNotNegative(double(*margin), "margin");
     options.margin = *margin;

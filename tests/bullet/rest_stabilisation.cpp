@@ -55,8 +55,8 @@ struct Pile {
         }
     }
 
-    /// Runs until no ring rocks, which takes some of them half a minute. Some rock so slowly that a second does not show
-    /// it.
+    /// Runs until no ring rocks, which takes some of them half a minute. Some rock so slowly that a second does not
+    /// show it.
     void settle() {
         world.run(8);
         for (int i = 0; i < 15 && farthest(4) > 0.02f * h; ++i) {

@@ -48,6 +48,14 @@ OpenSurface squareSurface() {
     }};
 }
 
+/// A cube, and grounds at z = 0: a plane and an open surface.
+struct BlockOverGrounds {
+    float half = 0.3f;
+    Collider block = colliderOf(shapes::box({half, half, half}));
+    float voxel = block.field().voxelSize();
+    PlacedShape grounds[2] = {{ContactShape::plane({0, 0, 1}, 0)}, {ContactShape::triangles(squareSurface())}};
+};
+
 /// Two rectangles that meet at x = 0 and z = 0.
 /// @param left, right  heights at x = -9 and x = 9
 OpenSurface bentSurface(float left, float right) {
@@ -206,11 +214,8 @@ TEST_CASE("Bodies that have passed a surface by less than a voxel move on along 
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    const float half = 0.3f;
-    const Collider block = colliderOf(shapes::box({half, half, half}));
-    const float voxel = block.field().voxelSize();
-    const OpenSurface floor = squareSurface();
-    const PlacedShape grounds[] = {{ContactShape::plane({0, 0, 1}, 0)}, {ContactShape::triangles(floor)}};
+    const BlockOverGrounds scene;
+    const auto& [half, block, voxel, grounds] = scene;
     for (const PlacedShape& ground : grounds)
         for (int round = 0; round < 40; ++round) {
             // on a face, an edge or a vertex
@@ -247,11 +252,8 @@ TEST_CASE("Bodies that have passed a surface by less than a voxel move on along 
 }
 
 TEST_CASE("A body that is pressed into the ground step by step does not get deeper for ever") {
-    const float half = 0.3f;
-    const Collider block = colliderOf(shapes::box({half, half, half}));
-    const float voxel = block.field().voxelSize();
-    const OpenSurface floor = squareSurface();
-    const PlacedShape grounds[] = {{ContactShape::plane({0, 0, 1}, 0)}, {ContactShape::triangles(floor)}};
+    const BlockOverGrounds scene;
+    const auto& [half, block, voxel, grounds] = scene;
     for (const PlacedShape& ground : grounds)
         for (const float start : {0.f, 0.27f, 0.3f, 0.4f}) {
             CAPTURE(&ground - grounds, start);

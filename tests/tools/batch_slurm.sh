@@ -5,7 +5,7 @@
 source "$(dirname "$0")/batch_shared.sh"
 need slurmctld slurmd sbatch scontrol squeue munged awk
 PATH=$PATH:/usr/sbin
-bilayer=$1 work=$2 port=$((20000 + $$ % 20000)) node=$(hostname -s) user=$(id -un) shards=4 count=200
+bilayer=$1 work=$2 resolution=112 port=$((20000 + $$ % 20000)) node=$(hostname -s) user=$(id -un) shards=4 count=200
 rm -rf "$work" && mkdir -p "$work"/{state,spool,pids} && chmod 755 "$work" && cd "$work"
 make_library meshes "$count"
 
@@ -63,7 +63,7 @@ wait_for 30 is_idle || { echo "skipped: Slurm does not start here"; tail -n 5 sl
 cat >shard.sh <<TEXT
 #!/bin/sh
 echo \$\$ >$work/pids/\$SLURM_ARRAY_TASK_ID
-exec $bilayer batch --tree $work/meshes -o $work/fields --threads 1 --resolution 48
+exec $bilayer batch --tree $work/meshes -o $work/fields --threads 1 --resolution $resolution
 TEXT
 job=$(sbatch --parsable --requeue --cpus-per-task=1 --array=1-$shards --output="$work/task-%a.txt" shard.sh)
 
@@ -86,6 +86,6 @@ after=$(lines 000002)
 grep -q '"outcome":"skipped"' fields/.bilayer/records/*000002-of-* || { echo "the requeued task skipped nothing"; exit 1; }
 
 unset SLURM_CONF
-"$bilayer" batch --tree meshes -o direct --resolution 48 >/dev/null
+"$bilayer" batch --tree meshes -o direct --resolution "$resolution" >/dev/null
 require_same fields direct
 echo "$count meshes by $shards tasks of Slurm; one was killed after $before meshes and went on, to $after records"
