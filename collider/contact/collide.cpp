@@ -134,10 +134,12 @@ SampledBody sampledBody(const Collider& collider) {
     const auto ballsOfPoints = [&collider] {
         BallsOfPoints balls;
         for (const SurfacePoint& point : collider.data().points().points()) balls.points.push_back(point.position);
-        const auto nodes = collider.data().points().nodes();
-        for (std::uint32_t i = 0; i < nodes.size(); ++i)
-            if (nodes[i].next == i + 1)
-                balls.balls.push_back({nodes[i].centre, nodes[i].radius, nodes[i].begin, nodes[i].end});
+        collider.data().points().tree().forEachLeaf(
+            [](const auto&) { return false; },
+            [&](const auto& leaf) {
+                balls.balls.push_back({leaf.centre, leaf.radius, leaf.begin, leaf.end});
+                return true;
+            });
         return balls;
     };
     return {collider.id(), &collider.field().data(), ballsOfPoints};

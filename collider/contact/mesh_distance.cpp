@@ -187,10 +187,10 @@ class PairSearch {
 
     const MeshDistance& run() {
         if (areSeparated(rootA_, rootB_)) return best_;
-        stack_[pending_++] = {0, rootA_, rootB_};
-        while (pending_ > 0) {
-            const NodePair pair = stack_[--pending_];
-            if (!(pair.bound2 < limit2_)) continue;
+        stack_.push({0, rootA_, rootB_});
+        while (!stack_.isEmpty()) {
+            const NodePair pair = stack_.pop();
+            if (!(pair.bound < limit2_)) continue;
             const bool leafA = a_.tree().isLeaf(pair.a.index), leafB = b_.tree().isLeaf(pair.b.index);
             if (leafA && leafB) {
                 measureLeaves(pair.a.index, pair.b.index);
@@ -212,7 +212,7 @@ class PairSearch {
 
   private:
     struct NodePair {
-        double bound2;
+        double bound;  // of their squared distance
         PosedNode a, b;
     };
 
@@ -231,15 +231,14 @@ class PairSearch {
               MakePair&& pairOf) {
         const OrientedBoxes& group = mesh.group(node);
         alignas(64) double bounds2[treeWidth];
-        const auto first = std::ptrdiff_t(pending_);
         unsigned near = boundDistances(other, group, mesh.frameOf(group), direction, limit2_, bounds2);
-        for (; near != 0; near &= near - 1) {
-            const auto slot = std::uint32_t(std::countr_zero(near));
-            const auto [a, b] = pairOf(PosedNode{group.firstChild + slot, &group, slot});
-            stack_[pending_++] = {bounds2[slot], a, b};
-        }
-        std::sort(stack_.begin() + first, stack_.begin() + std::ptrdiff_t(pending_),
-                  [](const NodePair& p, const NodePair& q) { return p.bound2 > q.bound2; });
+        stack_.pushSorted([&] {
+            for (; near != 0; near &= near - 1) {
+                const auto slot = std::uint32_t(std::countr_zero(near));
+                const auto [a, b] = pairOf(PosedNode{group.firstChild + slot, &group, slot});
+                stack_.push({bounds2[slot], a, b});
+            }
+        });
     }
 
     void measureLeaves(std::uint32_t a, std::uint32_t b) {
@@ -293,8 +292,7 @@ class PairSearch {
     NodeHeights heightsA_, heightsB_;  // along it, and against it
     int sinceCloser_ = 0;              // nodes opened since the closest pair was found
     LeafCache leavesA_, leavesB_;
-    std::size_t pending_ = 0;
-    std::array<NodePair, 2 * PosedTree::maxPending> stack_;
+    NearestStack<NodePair, 2> stack_;
 };
 
 MeshDistance search(const MeshTree& a, const MeshTree& b, const Similarity& aToB, double maxDistance,

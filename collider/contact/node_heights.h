@@ -63,27 +63,25 @@ inline double minHeight(PosedTree& mesh, std::uint32_t top, const glm::dvec3& di
         double bound;
         std::uint32_t node;
     };
-    std::array<Pending, PosedTree::maxPending> stack;
-    std::size_t pending = 0;
+    NearestStack<Pending> stack;
     double lowest = std::numeric_limits<double>::infinity();
-    stack[pending++] = {-lowest, top};
-    while (pending > 0) {
-        const auto [bound, node] = stack[--pending];
+    stack.push({-lowest, top});
+    while (!stack.isEmpty()) {
+        const auto [bound, node] = stack.pop();
         if (!(bound < lowest)) continue;
         if (mesh.tree().isLeaf(node)) {
             lowest = std::min(lowest, mesh.minHeight(node, direction));
             continue;
         }
         const OrientedBoxes& group = mesh.group(node);
-        const auto first = std::ptrdiff_t(pending);
         alignas(64) double bounds[treeWidth];
         unsigned below = boundHeights(group, mesh.frameOf(group), direction, lowest, bounds);
-        for (; below != 0; below &= below - 1) {
-            const auto slot = std::uint32_t(std::countr_zero(below));
-            stack[pending++] = {bounds[slot], group.firstChild + slot};
-        }
-        std::sort(stack.begin() + first, stack.begin() + std::ptrdiff_t(pending),
-                  [](const Pending& p, const Pending& q) { return p.bound > q.bound; });
+        stack.pushSorted([&] {
+            for (; below != 0; below &= below - 1) {
+                const auto slot = std::uint32_t(std::countr_zero(below));
+                stack.push({bounds[slot], group.firstChild + slot});
+            }
+        });
     }
     return lowest;
 }

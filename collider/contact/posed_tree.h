@@ -47,6 +47,33 @@ inline glm::dmat3 orthonormal(const glm::dmat3& m) {
     return {x, y, glm::dot(z, m[2]) < 0 ? -z : z};
 }
 
+/// What a search through one or two trees has still to visit, the nearest last.
+/// @tparam Entry  has a `bound`, the minimum of what is below
+/// @tparam trees  that the search descends
+template <class Entry, std::size_t trees = 1>
+class NearestStack {
+  public:
+    bool isEmpty() const { return count_ == 0; }
+    void push(const Entry& entry) { entries_[count_++] = entry; }
+    Entry pop() { return entries_[--count_]; }
+
+    /// Adds the entries that `pushAll` pushes, sorted.
+    template <class PushAll>
+    void pushSorted(const PushAll& pushAll) {
+        const auto first = std::ptrdiff_t(count_);
+        pushAll();
+        std::sort(entries_.begin() + first, entries_.begin() + std::ptrdiff_t(count_),
+                  [](const Entry& one, const Entry& other) { return one.bound > other.bound; });
+    }
+
+  private:
+    // Eleven levels of groups hold all nodes that 32 bits can number. Opening a group adds at most seven entries.
+    static constexpr std::size_t maxLevels = 11;
+
+    std::size_t count_ = 0;
+    std::array<Entry, trees*((treeWidth - 1) * maxLevels + 1)> entries_;
+};
+
 /// The triangles of a leaf, each once: a halved triangle may have several parts in it.
 struct LeafTriangles {
     std::size_t count = 0;
@@ -66,9 +93,6 @@ struct LeafTriangles {
 /// again.
 class PosedTree {
   public:
-    /// The size of a stack for a traversal: at most ten levels, each of which leaves at most seven pending nodes.
-    static constexpr std::size_t maxPending = 80;
-
     PosedTree(const MeshTree& mesh, const Similarity& map) : mesh_(mesh), map_(map) {
         ofFrame_.fill(nullptr);
         unit_ = map.scale * double(mesh.voxelSize());

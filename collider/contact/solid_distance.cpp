@@ -20,8 +20,6 @@ namespace {
 constexpr double searchPrecision = 1e-8;
 // Weights of corners below this are rounding.
 constexpr double minWeight = 1e-9;
-// Each level of the tree leaves at most seven pending nodes.
-constexpr std::size_t maxPending = 80;
 
 /// The closest points of a triangle and a solid.
 struct TriangleDistance {
@@ -158,8 +156,8 @@ class SolidSearch {
     SolidDistance run(std::uint32_t start) {
         if (start < posed_.triangleCount()) measure(start);
         push({mesh_.tree().root()});
-        while (pending_ > 0 && best_.distance > Solid::minDistance) {
-            const Pending next = stack_[--pending_];
+        while (!stack_.isEmpty() && best_.distance > Solid::minDistance) {
+            const Pending next = stack_.pop();
             if (!(next.bound < best_.distance)) continue;
             if (mesh_.tree().isLeaf(next.node.index))
                 for (const std::uint32_t triangle : LeafTriangles(mesh_.tree().leaves[next.node.index]))
@@ -178,17 +176,16 @@ class SolidSearch {
 
     void push(const PosedNode& node) {
         const double bound = solid_.bound(posed_.boundsOf(node));
-        if (bound < best_.distance) stack_[pending_++] = {bound, node};
+        if (bound < best_.distance) stack_.push({bound, node});
     }
 
     /// Replaces a node by its children, the nearest last.
     void open(std::uint32_t node) {
         const OrientedBoxes& group = mesh_.group(node);
-        const std::size_t first = pending_;
-        for (std::uint32_t slot = 0; slot < treeWidth; ++slot)
-            if (group.lower[0][slot] <= group.upper[0][slot]) push({group.firstChild + slot, &group, slot});
-        std::sort(stack_.begin() + std::ptrdiff_t(first), stack_.begin() + std::ptrdiff_t(pending_),
-                  [](const Pending& one, const Pending& other) { return one.bound > other.bound; });
+        stack_.pushSorted([&] {
+            for (std::uint32_t slot = 0; slot < treeWidth; ++slot)
+                if (group.lower[0][slot] <= group.upper[0][slot]) push({group.firstChild + slot, &group, slot});
+        });
     }
 
     void measure(std::uint32_t triangle) {
@@ -202,8 +199,7 @@ class SolidSearch {
     const Similarity identity_;
     PosedTree posed_;
     SolidDistance best_;
-    std::size_t pending_ = 0;
-    std::array<Pending, maxPending> stack_;
+    NearestStack<Pending> stack_;
 };
 
 double sizeOf(const MeshTree& mesh) {

@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtx/norm.hpp>
 #include <numeric>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -31,7 +32,7 @@ constexpr double corner = 0.5;             // min convexity of a vertex: a cube'
 constexpr double sharpConvexity = 0.15;    // min convexity of an edge: a cube's have 0.35
 constexpr double borderConvexity = 0.45;   // of the border of an open surface: a sharp edge, and no corner
 constexpr double thinnestWall = 0.02;      // what is thinner is an open surface [spacings]
-constexpr std::uint32_t leafPoints = 8;    // max count of points in a leaf of the tree
+constexpr std::size_t leafPoints = 8;      // max count of points in a leaf of the tree
 constexpr float sphereGrowth = 1.000001f;  // growth factor of spheres, against rounding in single precision
 
 struct Candidate {
@@ -289,41 +290,27 @@ std::vector<Candidate> pointsOf(const Mesh& mesh, double spacing, const SurfaceP
     return points;
 }
 
-Bounds boxOf(const std::vector<SurfacePoint>& points, std::uint32_t begin, std::uint32_t end) {
+Bounds boxOf(std::span<const SurfacePoint> points) {
     Bounds box;
-    for (std::uint32_t i = begin; i < end; ++i) box.add(points[i].position);
+    for (const SurfacePoint& point : points) box.add(point.position);
     return box;
 }
 
-// Sorts the points of [begin, end) by recursive halving along the longest side of their box.
-void order(std::vector<SurfacePoint>& points, std::uint32_t begin, std::uint32_t end) {
-    if (end - begin <= leafPoints) return;
-    const glm::vec3 size = boxOf(points, begin, end).size();
+// Moves the points of lower position along the longest side of their box before the middle.
+void sortHalves(std::span<SurfacePoint> points, std::size_t middle) {
+    const glm::vec3 size = boxOf(points).size();
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    const std::uint32_t middle = begin + (end - begin) / 2;
-    const auto first = points.begin();
-    std::nth_element(first + begin, first + middle, first + end, [axis](const SurfacePoint& a, const SurfacePoint& b) {
-        return a.position[axis] < b.position[axis];
-    });
-    order(points, begin, middle);
-    order(points, middle, end);
+    std::nth_element(
+        points.begin(), points.begin() + std::ptrdiff_t(middle), points.end(),
+        [axis](const SurfacePoint& a, const SurfacePoint& b) { return a.position[axis] < b.position[axis]; });
 }
 
-// Appends the nodes of sorted points in preorder.
-void addNode(const std::vector<SurfacePoint>& points, std::vector<PointNode>& nodes, std::uint32_t begin,
-             std::uint32_t end) {
-    const glm::vec3 centre = boxOf(points, begin, end).centre();
-    float radius = 0;
-    for (std::uint32_t i = begin; i < end; ++i) radius = std::max(radius, glm::distance(centre, points[i].position));
-    const std::size_t node = nodes.size();
-    nodes.push_back({centre, radius * sphereGrowth, begin, end, 0});
-
-    if (end - begin > leafPoints) {
-        const std::uint32_t middle = begin + (end - begin) / 2;
-        addNode(points, nodes, begin, middle);
-        addNode(points, nodes, middle, end);
-    }
-    nodes[node].next = std::uint32_t(nodes.size());
+PointSphere sphereAround(std::span<const SurfacePoint> points) {
+    PointSphere sphere{boxOf(points).centre(), 0};
+    for (const SurfacePoint& point : points)
+        sphere.radius = std::max(sphere.radius, glm::distance(sphere.centre, point.position));
+    sphere.radius *= sphereGrowth;
+    return sphere;
 }
 
 }  // namespace
@@ -337,12 +324,20 @@ SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing, const IsOutside& i
         points_.push_back(
             {glm::vec3(point.position), glm::vec3(point.normal), point.convexity >= sharpConvexity, point.isInner});
     if (points_.empty()) throw std::invalid_argument("all triangles of the mesh are degenerate");
-    order(points_, 0, std::uint32_t(points_.size()));
-    addNode(points_, nodes_, 0, std::uint32_t(points_.size()));
+    buildTree([&](std::size_t begin, std::size_t middle, std::size_t end) {
+        sortHalves(std::span(points_).subspan(begin, end - begin), middle - begin);
+    });
 }
 
 SurfacePoints::SurfacePoints(std::vector<SurfacePoint> ordered) : points_(std::move(ordered)) {
-    addNode(points_, nodes_, 0, std::uint32_t(points_.size()));
+    buildTree([](std::size_t, std::size_t, std::size_t) {});
+}
+
+template <class Split>
+void SurfacePoints::buildTree(const Split& split) {
+    tree_.build(points_.size(), leafPoints, split, [&](std::uint32_t node) {
+        return sphereAround(std::span(points_).subspan(tree_[node].begin, tree_[node].end - tree_[node].begin));
+    });
 }
 
 }  // namespace bilayer::detail

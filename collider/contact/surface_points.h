@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/bvh/median_tree.h"
 
 namespace bilayer::detail {
 
@@ -21,13 +22,10 @@ struct SurfacePoint {
     bool isInner = false;
 };
 
-/// A node of the tree: a bounding sphere of consecutive points. Nodes are in preorder: the first child of node i is i +
-/// 1; the second child follows the subtree of the first. A node is a leaf if `next` is i + 1.
-struct PointNode {
-    glm::vec3 centre;          ///< [m]
-    float radius;              ///< [m]
-    std::uint32_t begin, end;  ///< range of points
-    std::uint32_t next;        ///< index of the node after this subtree
+/// A sphere around points.
+struct PointSphere {
+    glm::vec3 centre;  ///< [m]
+    float radius;      ///< [m]
 };
 
 /// Points distributed over a mesh's surface. Every place of the surface has a point with about the same normal within
@@ -46,11 +44,12 @@ class SurfacePoints {
     /// @param isOutside  finds open surfaces, which have the outside on both sides. Empty if there are none.
     SurfacePoints(const Mesh& mesh, float spacing, const IsOutside& isOutside = {});
 
-    /// From the points() of another one, in the same order; the nodes are equal bit for bit. Needs at least one point.
+    /// From the points() of another one, in the same order; the spheres are equal bit for bit. Needs at least one
+    /// point.
     explicit SurfacePoints(std::vector<SurfacePoint> ordered);
 
     std::span<const SurfacePoint> points() const { return points_; }
-    std::span<const PointNode> nodes() const { return nodes_; }
+    const MedianTree<PointSphere>& tree() const { return tree_; }
 
     /// Visits the points near a region, in ascending order of their index, without allocation.
     /// @param reject  (const glm::vec3& centre, float radius) -> bool: true if the sphere contains nothing of interest
@@ -59,22 +58,20 @@ class SurfacePoints {
     void visit(Reject&& reject, Visit&& visit) const;
 
   private:
+    template <class Split>
+    void buildTree(const Split& split);
+
     std::vector<SurfacePoint> points_;
-    std::vector<PointNode> nodes_;
+    MedianTree<PointSphere> tree_;
 };
 
 template <class Reject, class Visit>
 void SurfacePoints::visit(Reject&& reject, Visit&& visit) const {
-    for (std::uint32_t i = 0; i < nodes_.size();) {
-        const PointNode& node = nodes_[i];
-        if (reject(node.centre, node.radius)) {
-            i = node.next;
-            continue;
-        }
-        if (node.next == i + 1)
-            for (std::uint32_t p = node.begin; p < node.end; ++p) visit(p, points_[p]);
-        ++i;
-    }
+    tree_.forEachLeaf([&](const PointSphere& sphere) { return reject(sphere.centre, sphere.radius); },
+                      [&](const auto& leaf) {
+                          for (std::uint32_t p = leaf.begin; p < leaf.end; ++p) visit(p, points_[p]);
+                          return true;
+                      });
 }
 
 }  // namespace bilayer::detail

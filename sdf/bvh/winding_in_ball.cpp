@@ -31,22 +31,19 @@ glm::dvec3 times(const Symmetric2& m, const glm::dvec3& u) {
 
 WindingInBall::WindingInBall(const WindingNumber& winding, const glm::dvec3& centre, double radius)
     : winding_(winding), centre_(centre) {
-    std::vector<std::uint32_t> open{0};
-    while (!open.empty()) {
-        const std::uint32_t at = open.back();
-        open.pop_back();
-        const Node& node = winding.nodes_[at];
+    const auto isFar = [&](const Node& node) {
         const glm::dvec3 toCentre = node.centre - centre;
         const double distance = glm::length(toCentre);
-        if (node.radius + radius < farRatio * distance)
-            addFar(node, toCentre, radius);
-        else if (node.radius < clusterRatio * (distance - radius))
-            clusters_.push_back(&node);
-        else if (node.right == 0)
-            addTriangles(node);
-        else
-            open.insert(open.end(), {node.right, at + 1});
-    }
+        const bool far = node.radius + radius < farRatio * distance;
+        const bool isCluster = !far && node.radius < clusterRatio * (distance - radius);
+        if (far) addFar(node, toCentre, radius);
+        if (isCluster) clusters_.push_back(&node);
+        return far || isCluster;
+    };
+    winding.tree_.forEachLeaf(isFar, [&](const Node& leaf) {
+        addTriangles(leaf);
+        return true;
+    });
 }
 
 // The kernel of WindingCluster about a triangle's centre: its term of first order integrates to 0, and those of order

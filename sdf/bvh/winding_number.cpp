@@ -40,12 +40,13 @@ bool segmentMeets(const glm::dvec3& from, const glm::dvec3& to, const std::array
     return !((start > 0 && end > 0) || (start < 0 && end < 0));
 }
 
-}  // namespace
-
-struct WindingNumber::Item {
+/// A triangle with its middle [m].
+struct Item {
     glm::vec3 at;
     std::uint32_t index;
 };
+
+}  // namespace
 
 WindingNumber::WindingNumber(const Mesh& mesh, Progress* progress) {
     validate(mesh);
@@ -57,46 +58,34 @@ WindingNumber::WindingNumber(const Mesh& mesh, Progress* progress) {
             items[i] = {(mesh.points[t.x] + mesh.points[t.y] + mesh.points[t.z]) / 3.f, std::uint32_t(i)};
         }
     });
-    nodes_ = vectorOf<Node>(medianTreeNodes(count, leafTriangles), progress);
     triangles_ = vectorOf<Corners>(count, progress);
-    // Corners are copied once the ranges are final. The sums of a node follow from those of its children.
-    struct Builder {
-        WindingNumber& tree;
-        const Mesh& mesh;
-        std::vector<Item>& items;
-        Progress* progress;
-        Bounds operator()(std::size_t at, std::size_t begin, std::size_t end) const {
-            Node& node = tree.nodes_[at];
-            node.begin = std::uint32_t(begin);
-            node.end = std::uint32_t(end);
-            if (end - begin <= leafTriangles) {
-                std::sort(items.begin() + std::ptrdiff_t(begin), items.begin() + std::ptrdiff_t(end),
-                          [](const Item& a, const Item& b) { return a.index < b.index; });
-                for (std::size_t i = begin; i < end; ++i) {
-                    const glm::uvec3 t = mesh.triangles[items[i].index];
-                    tree.triangles_[i] = {mesh.points[t.x], mesh.points[t.y], mesh.points[t.z]};
-                }
-                node.right = 0;
-                const std::span<const Corners> triangles(tree.triangles_.data() + begin, end - begin);
-                static_cast<WindingCluster&>(node) = WindingCluster(triangles);
-                Bounds box;
-                for (const Corners& triangle : triangles)
-                    for (const glm::vec3& corner : triangle) box.add(corner);
-                return box;
-            }
-            const std::size_t middle = splitAtMedian(items, begin, end, progress), left = at + 1;
-            const std::size_t right = left + medianTreeNodes(middle - begin, leafTriangles);
-            node.right = std::uint32_t(right);
-            Bounds box, other;
-            buildChildren(
-                end - begin, [&] { box = (*this)(left, begin, middle); }, [&] { other = (*this)(right, middle, end); });
-            box.add(other.lower);
-            box.add(other.upper);
-            static_cast<WindingCluster&>(node) = WindingCluster(tree.nodes_[left], tree.nodes_[right], box);
-            return box;
-        }
+    auto boxes = vectorOf<Bounds>(Tree::nodeCount(count, leafTriangles), progress);
+    const auto split = [&](std::size_t begin, std::size_t middle, std::size_t end) {
+        splitAtMedian(std::span(items).subspan(begin, end - begin), middle - begin, progress);
     };
-    Builder{*this, mesh, items, progress}(0, 0, count);
+    // Corners are copied once the ranges are final. The sums of a node follow from those of its children.
+    const auto summarise = [&](std::uint32_t at) {
+        const Node& node = tree_[at];
+        Bounds& box = boxes[at];
+        if (!tree_.isLeaf(at)) {
+            const std::uint32_t first = tree_.first(at), second = tree_.second(at);
+            for (const std::uint32_t child : {first, second}) {
+                box.add(boxes[child].lower);
+                box.add(boxes[child].upper);
+            }
+            return WindingCluster(tree_[first], tree_[second], box);
+        }
+        const auto own = std::span(items).subspan(node.begin, node.end - node.begin);
+        std::sort(own.begin(), own.end(), [](const Item& a, const Item& b) { return a.index < b.index; });
+        const std::span<Corners> triangles(triangles_.data() + node.begin, own.size());
+        for (std::size_t i = 0; i < own.size(); ++i) {
+            const glm::uvec3 t = mesh.triangles[own[i].index];
+            triangles[i] = {mesh.points[t.x], mesh.points[t.y], mesh.points[t.z]};
+            for (const glm::vec3& corner : triangles[i]) box.add(corner);
+        }
+        return WindingCluster(triangles);
+    };
+    tree_.build(count, leafTriangles, split, summarise, progress);
 }
 
 double WindingNumber::solidAngles(const Node& node, const glm::dvec3& point) const {
@@ -121,15 +110,14 @@ WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point, double 
         while (!open.empty()) {
             const std::uint32_t at = open.back();
             open.pop_back();
-            const Node& node = nodes_[at];
-            const Estimate far = node.expansion(point);
+            const Estimate far = tree_[at].expansion(point);
             if (far.error < WindingCluster::uselessError) {
                 sum.value += far.value;
                 sum.error += far.error;
                 heap.push_back({far, at});
                 std::push_heap(heap.begin(), heap.end());
             } else
-                refine(node, at, point, sum, open);
+                refine(at, point, sum, open);
         }
         if (heap.empty()) return {sum.value, 0};
         if (sum.error < share * std::abs(sum.value - 0.5)) return {sum.value, std::max(sum.error, 0.0)};
@@ -138,18 +126,17 @@ WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point, double 
         heap.pop_back();
         sum.value -= worst.estimate.value;
         sum.error -= worst.estimate.error;
-        refine(nodes_[worst.node], worst.node, point, sum, open);
+        refine(worst.node, point, sum, open);
     }
 }
 
 /// The sum over the triangles of a node. Each cluster that represents its triangles has an error below `maxError`.
 WindingNumber::Estimate WindingNumber::sumOf(std::uint32_t at, const glm::dvec3& point, double maxError) const {
-    const Node& node = nodes_[at];
-    const Estimate far = node.expansion(point);
+    const Estimate far = tree_[at].expansion(point);
     if (far.error < maxError) return far;
-    if (node.right == 0) return {solidAngles(node, point), 0};
-    const Estimate left = sumOf(at + 1, point, maxError), right = sumOf(node.right, point, maxError);
-    return {left.value + right.value, left.error + right.error};
+    if (tree_.isLeaf(at)) return {solidAngles(tree_[at], point), 0};
+    const Estimate first = sumOf(tree_.first(at), point, maxError), second = sumOf(tree_.second(at), point, maxError);
+    return {first.value + second.value, first.error + second.error};
 }
 
 bool WindingNumber::isInside(const glm::dvec3& point) const noexcept {
@@ -160,7 +147,7 @@ bool WindingNumber::isInside(const glm::dvec3& point) const noexcept {
 }
 
 std::size_t WindingNumber::memoryBytes() const noexcept {
-    return triangles_.size() * sizeof(Corners) + nodes_.size() * sizeof(Node);
+    return triangles_.size() * sizeof(Corners) + tree_.nodes().size_bytes();
 }
 
 // A first estimate bounds the true number's difference from 1/2. The second one then has an error below a half.
@@ -171,34 +158,26 @@ int WindingNumber::nearestInteger(const glm::dvec3& point) const {
     return int(std::lround(second.value));
 }
 
-void WindingNumber::refine(const Node& node, std::uint32_t at, const glm::dvec3& point, Estimate& sum,
+void WindingNumber::refine(std::uint32_t at, const glm::dvec3& point, Estimate& sum,
                            std::vector<std::uint32_t>& open) const {
-    if (node.right == 0)
-        sum.value += solidAngles(node, point);
-    else {
-        open.push_back(node.right);
-        open.push_back(at + 1);
-    }
+    if (tree_.isLeaf(at))
+        sum.value += solidAngles(tree_[at], point);
+    else
+        open.insert(open.end(), {tree_.second(at), tree_.first(at)});
 }
 
 bool WindingNumber::meets(const glm::dvec3& from, const glm::dvec3& to) const {
     const glm::dvec3 middle = 0.5 * (from + to);
     const double half = 0.5 * glm::length(to - from) * (1 + 1e-9);
-    std::vector<std::uint32_t> open{0};
-    while (!open.empty()) {
-        const std::uint32_t at = open.back();
-        open.pop_back();
-        const Node& node = nodes_[at];
-        if (glm::length(node.centre - middle) > node.radius * (1 + 1e-9) + half) continue;
-        if (node.right != 0) {
-            open.push_back(node.right);
-            open.push_back(at + 1);
-            continue;
-        }
-        for (std::uint32_t i = node.begin; i < node.end; ++i)
-            if (segmentMeets(from, to, triangles_[i])) return true;
-    }
-    return false;
+    bool found = false;
+    const auto isFar = [&](const Node& node) {
+        return glm::length(node.centre - middle) > node.radius * (1 + 1e-9) + half;
+    };
+    tree_.forEachLeaf(isFar, [&](const Node& leaf) {
+        for (std::uint32_t i = leaf.begin; i < leaf.end && !found; ++i) found = segmentMeets(from, to, triangles_[i]);
+        return !found;
+    });
+    return found;
 }
 
 }  // namespace bilayer::detail

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/bvh/median_tree.h"
 #include "sdf/bvh/winding_cluster.h"
 
 namespace bilayer::detail {
@@ -44,7 +45,7 @@ class WindingNumber {
     /// Returns whether any triangle intersects or touches the segment between two points [m].
     bool meets(const glm::dvec3& from, const glm::dvec3& to) const;
 
-    double area() const { return nodes_.front().area; }  ///< of all triangles [m^2]
+    double area() const { return tree_[0].area; }  ///< of all triangles [m^2]
     std::size_t memoryBytes() const noexcept;
 
   private:
@@ -55,19 +56,15 @@ class WindingNumber {
     static constexpr double onlySide = 0.999;
 
     using Corners = WindingCluster::Corners;
-    struct Node : WindingCluster {
-        std::uint32_t begin, end;  // range of triangles
-        std::uint32_t right;       // the second child, or 0 for a leaf; the first child is the next node
-    };
-    struct Item;
+    using Tree = MedianTree<WindingCluster>;
+    using Node = Tree::Node;
 
     double solidAngles(const Node& node, const glm::dvec3& point) const;
     Estimate sumOf(std::uint32_t at, const glm::dvec3& point, double maxError) const;
-    void refine(const Node& node, std::uint32_t at, const glm::dvec3& point, Estimate& sum,
-                std::vector<std::uint32_t>& open) const;
+    void refine(std::uint32_t at, const glm::dvec3& point, Estimate& sum, std::vector<std::uint32_t>& open) const;
 
     std::vector<Corners> triangles_;
-    std::vector<Node> nodes_;
+    Tree tree_;
 };
 
 }  // namespace bilayer::detail

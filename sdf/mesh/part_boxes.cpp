@@ -8,7 +8,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::uint32_t leafItems = 4;
+constexpr std::size_t leafItems = 4;
 
 float coordinate(const Bounds& box, int axis) {
     return axis < 3 ? box.lower[axis] : box.upper[axis - 3];
@@ -35,31 +35,27 @@ int widestAxis(std::span<const RankedBox> items) {
 }  // namespace
 
 PartBoxes::PartBoxes(std::vector<RankedBox> items) : items_(std::move(items)) {
-    if (!items_.empty()) build(0, std::uint32_t(items_.size()));
+    if (items_.empty()) return;
+    const auto split = [&](std::size_t begin, std::size_t middle, std::size_t end) {
+        const auto range = std::span(items_).subspan(begin, end - begin);
+        std::nth_element(range.begin(), range.begin() + std::ptrdiff_t(middle - begin), range.end(),
+                         [axis = widestAxis(range)](const RankedBox& a, const RankedBox& b) {
+                             const float x = coordinate(a.box, axis), y = coordinate(b.box, axis);
+                             return x != y ? x < y : a.rank < b.rank;
+                         });
+    };
+    tree_.build(items_.size(), leafItems, split, [&](std::uint32_t node) { return groupOf(node); });
 }
 
-void PartBoxes::build(std::uint32_t begin, std::uint32_t end) {
-    const std::size_t at = nodes_.size();
-    nodes_.push_back({{}, ~0u, 0, begin, end, 0});
-    const std::span range = std::span(items_).subspan(begin, end - begin);
-    for (const RankedBox& item : range) {
-        Node& node = nodes_[at];
-        node.box.add(item.box.lower);
-        node.box.add(item.box.upper);
-        node.firstRank = std::min(node.firstRank, item.rank);
-        node.lastRank = std::max(node.lastRank, item.rank);
+PartBoxes::Group PartBoxes::groupOf(std::uint32_t node) const {
+    Group group;
+    for (const RankedBox& item : std::span(items_).subspan(tree_[node].begin, tree_[node].end - tree_[node].begin)) {
+        group.box.add(item.box.lower);
+        group.box.add(item.box.upper);
+        group.firstRank = std::min(group.firstRank, item.rank);
+        group.lastRank = std::max(group.lastRank, item.rank);
     }
-    if (range.size() <= leafItems) return;
-    const int axis = widestAxis(range);
-    const std::uint32_t middle = begin + (end - begin) / 2;
-    std::nth_element(range.begin(), range.begin() + (middle - begin), range.end(),
-                     [axis](const RankedBox& a, const RankedBox& b) {
-                         const float x = coordinate(a.box, axis), y = coordinate(b.box, axis);
-                         return x != y ? x < y : a.rank < b.rank;
-                     });
-    build(begin, middle);
-    nodes_[at].right = std::uint32_t(nodes_.size());
-    build(middle, end);
+    return group;
 }
 
 }  // namespace bilayer::detail

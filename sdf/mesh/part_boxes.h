@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
-
 #include "sdf/base/box_relations.h"
+#include "sdf/bvh/median_tree.h"
 
 namespace bilayer::detail {
 
@@ -36,7 +36,7 @@ class PartBoxes {
         };
         std::priority_queue<Entry> queue;
         const auto enter = [&](std::uint32_t node) {
-            if (holds(nodes_[node].box, inner)) queue.push({nodes_[node].lastRank, node, noItem});
+            if (holds(tree_[node].box, inner)) queue.push({tree_[node].lastRank, node, noItem});
         };
         if (!items_.empty()) enter(0);
         while (!queue.empty()) {
@@ -46,13 +46,12 @@ class PartBoxes {
                 if (!visit(items_[next.item])) return;
                 continue;
             }
-            const Node& node = nodes_[next.node];
-            if (node.right != 0) {
-                enter(next.node + 1);
-                enter(node.right);
+            if (!tree_.isLeaf(next.node)) {
+                enter(tree_.first(next.node));
+                enter(tree_.second(next.node));
                 continue;
             }
-            for (std::uint32_t i = node.begin; i < node.end; ++i)
+            for (std::uint32_t i = tree_[next.node].begin; i < tree_[next.node].end; ++i)
                 if (holds(items_[i].box, inner)) queue.push({items_[i].rank, next.node, i});
         }
     }
@@ -61,40 +60,29 @@ class PartBoxes {
     /// false.
     template <class Visit>
     void forEachOverlap(const Bounds& box, unsigned first, unsigned last, const Visit& visit) const {
-        const auto meets = [&](const auto& at) {
-            return at.firstRank <= last && at.lastRank >= first && overlap(at.box, box);
+        const auto misses = [&](const Group& group) {
+            return group.firstRank > last || group.lastRank < first || !overlap(group.box, box);
         };
-        std::vector<std::uint32_t> open;
-        if (!items_.empty()) open.push_back(0);
-        while (!open.empty()) {
-            const std::uint32_t at = open.back();
-            const Node& node = nodes_[at];
-            open.pop_back();
-            if (!meets(node)) continue;
-            if (node.right != 0) {
-                open.push_back(node.right);
-                open.push_back(at + 1);
-                continue;
-            }
-            for (const RankedBox& item : std::span(items_).subspan(node.begin, node.end - node.begin))
-                if (item.rank >= first && item.rank <= last && overlap(item.box, box) && !visit(item)) return;
-        }
+        tree_.forEachLeaf(misses, [&](const auto& leaf) {
+            for (const RankedBox& item : std::span(items_).subspan(leaf.begin, leaf.end - leaf.begin))
+                if (item.rank >= first && item.rank <= last && overlap(item.box, box) && !visit(item)) return false;
+            return true;
+        });
     }
 
   private:
     static constexpr std::uint32_t noItem = ~0u;
 
-    struct Node {
+    /// The box and the ranks of several boxes.
+    struct Group {
         Bounds box;
-        unsigned firstRank, lastRank;
-        std::uint32_t begin, end;  // items
-        std::uint32_t right;       // the second child; 0 for a leaf. The first child is the next node.
+        unsigned firstRank = ~0u, lastRank = 0;
     };
 
-    void build(std::uint32_t begin, std::uint32_t end);
+    Group groupOf(std::uint32_t node) const;
 
     std::vector<RankedBox> items_;
-    std::vector<Node> nodes_;
+    MedianTree<Group> tree_;
 };
 
 }  // namespace bilayer::detail

@@ -6,11 +6,16 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <limits>
+#include <span>
 
-#include "sdf/bvh/median_tree.h"
 #include "sdf/mesh/topology.h"
 
 namespace bilayer::detail {
+namespace {
+
+constexpr std::size_t leafEdges = 4;
+
+}  // namespace
 
 WindingSlope::WindingSlope(const Mesh& mesh, Progress* progress) {
     Topology(mesh, progress).forEachUnbalancedEdge([&](unsigned first, unsigned second, unsigned count) {
@@ -18,37 +23,35 @@ WindingSlope::WindingSlope(const Mesh& mesh, Progress* progress) {
         edges_.push_back({from, to, double(count), 0.5f * (from + to), std::uint32_t(edges_.size())});
     });
     if (edges_.empty()) return;
-    nodes_.resize(medianTreeNodes(edges_.size(), leafEdges));
-    build(0, 0, edges_.size(), progress);
+    const auto split = [&](std::size_t begin, std::size_t middle, std::size_t end) {
+        splitAtMedian(std::span(edges_).subspan(begin, end - begin), middle - begin, progress);
+    };
+    tree_.build(
+        edges_.size(), leafEdges, split, [&](std::uint32_t node) { return ballOf(node); }, progress);
 }
 
 double WindingSlope::operator()(const glm::dvec3& centre, double radius) const {
-    return nodes_.empty() ? 0 : bound(0, centre, radius) / (4 * glm::pi<double>());
+    return edges_.empty() ? 0 : bound(0, centre, radius) / (4 * glm::pi<double>());
 }
 
-void WindingSlope::build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress) {
-    Node& node = nodes_[at];
-    node = {glm::dvec3(edges_[begin].at), 0, 0, begin, end, 0};
-    for (std::size_t i = begin; i < end; ++i) {
-        const UnbalancedEdge& edge = edges_[i];
-        node.length += edge.excess * glm::length(edge.to - edge.from);
-        node.radius = std::max({node.radius, glm::length(edge.from - node.centre), glm::length(edge.to - node.centre)});
+WindingSlope::Ball WindingSlope::ballOf(std::uint32_t node) const {
+    const auto edges = std::span(edges_).subspan(tree_[node].begin, tree_[node].end - tree_[node].begin);
+    Ball ball{glm::dvec3(edges.front().at), 0, 0};
+    for (const UnbalancedEdge& edge : edges) {
+        ball.length += edge.excess * glm::length(edge.to - edge.from);
+        ball.radius = std::max({ball.radius, glm::length(edge.from - ball.centre), glm::length(edge.to - ball.centre)});
     }
-    if (end - begin <= leafEdges) return;
-    const std::size_t middle = splitAtMedian(edges_, begin, end, progress);
-    node.right = at + 1 + medianTreeNodes(middle - begin, leafEdges);
-    buildChildren(
-        end - begin, [&] { build(at + 1, begin, middle, progress); },
-        [&] { build(node.right, middle, end, progress); });
+    return ball;
 }
 
-double WindingSlope::bound(std::size_t at, const glm::dvec3& centre, double radius) const {
-    const Node& node = nodes_[at];
-    const double separation = glm::length(node.centre - centre) - node.radius - radius;
-    if (separation > 2 * node.radius) return node.length / (separation * separation);
+double WindingSlope::bound(std::uint32_t node, const glm::dvec3& centre, double radius) const {
+    const auto& ball = tree_[node];
+    const double separation = glm::length(ball.centre - centre) - ball.radius - radius;
+    if (separation > 2 * ball.radius) return ball.length / (separation * separation);
+    if (!tree_.isLeaf(node))
+        return bound(tree_.first(node), centre, radius) + bound(tree_.second(node), centre, radius);
     double sum = 0;
-    if (node.right != 0) return bound(at + 1, centre, radius) + bound(node.right, centre, radius);
-    for (std::size_t i = node.begin; i < node.end; ++i) sum += ofEdge(edges_[i], centre, radius);
+    for (std::size_t i = ball.begin; i < ball.end; ++i) sum += ofEdge(edges_[i], centre, radius);
     return sum;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/bvh/median_tree.h"
 
 namespace bilayer::detail {
 
@@ -33,19 +34,19 @@ class WindingSlope {
         glm::vec3 at;   // midpoint
         std::uint32_t index;
     };
-    struct Node {
+    /// A ball around edges.
+    struct Ball {
         glm::dvec3 centre;
-        double radius, length;
-        std::size_t begin, end, right;
+        double radius;
+        double length;  // of the edges, each times its excess
     };
-    static constexpr std::size_t leafEdges = 4;
 
-    void build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress);
-    double bound(std::size_t at, const glm::dvec3& centre, double radius) const;
+    Ball ballOf(std::uint32_t node) const;
+    double bound(std::uint32_t node, const glm::dvec3& centre, double radius) const;
     static double ofEdge(const UnbalancedEdge& edge, const glm::dvec3& centre, double radius);
 
     std::vector<UnbalancedEdge> edges_;
-    std::vector<Node> nodes_;
+    MedianTree<Ball> tree_;
 };
 
 }  // namespace bilayer::detail

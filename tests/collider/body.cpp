@@ -67,8 +67,8 @@ void requireSame(const Body& a, const Body& b) {
         REQUIRE(p.normal == q.normal);
         REQUIRE(p.isSharp == q.isSharp);
     }
-    REQUIRE(std::equal(a.points.nodes().begin(), a.points.nodes().end(), b.points.nodes().begin(),
-                       b.points.nodes().end(), [](const PointNode& m, const PointNode& n) {
+    REQUIRE(std::equal(a.points.tree().nodes().begin(), a.points.tree().nodes().end(), b.points.tree().nodes().begin(),
+                       b.points.tree().nodes().end(), [](const auto& m, const auto& n) {
                            return m.centre == n.centre && m.radius == n.radius && m.begin == n.begin &&
                                   m.end == n.end && m.next == n.next;
                        }));

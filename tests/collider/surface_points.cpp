@@ -305,7 +305,7 @@ TEST_CASE("the spheres of the tree hold their points, and its nodes part them") 
     for (const auto& [name, mesh, spacing] : cases()) {
         CAPTURE(name);
         const SurfacePoints points(mesh, spacing);
-        const auto nodes = points.nodes();
+        const auto nodes = points.tree().nodes();
         REQUIRE(nodes[0].begin == 0);
         REQUIRE(nodes[0].end == points.points().size());
         REQUIRE(nodes[0].next == nodes.size());
@@ -317,7 +317,7 @@ TEST_CASE("the spheres of the tree hold their points, and its nodes part them") 
                 REQUIRE(nodes[i].end - nodes[i].begin <= 8);
                 continue;
             }
-            const PointNode &first = nodes[i + 1], &second = nodes[first.next];
+            const auto &first = nodes[i + 1], &second = nodes[first.next];
             REQUIRE(first.begin == nodes[i].begin);
             REQUIRE(first.end == second.begin);
             REQUIRE(second.end == nodes[i].end);
