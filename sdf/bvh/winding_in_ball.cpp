@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
+#include <span>
 
 #include "sdf/bvh/solid_angle.h"
 
@@ -27,28 +28,33 @@ glm::dvec3 times(const Symmetric2& m, const glm::dvec3& u) {
             m[5] * u.x + m[4] * u.y + m[2] * u.z};
 }
 
+bool isFar(double clusterRadius, double distance, double radius) {
+    return clusterRadius + radius < farRatio * distance;
+}
+
 }  // namespace
 
 WindingInBall::WindingInBall(const WindingNumber& winding, const glm::dvec3& centre, double radius)
     : winding_(winding), centre_(centre) {
-    const auto isFar = [&](const Node& node) {
+    const auto isSettled = [&](const Node& node) {
         const glm::dvec3 toCentre = node.centre - centre;
         const double distance = glm::length(toCentre);
-        const bool far = node.radius + radius < farRatio * distance;
+        const bool far = isFar(node.radius, distance, radius);
         const bool isCluster = !far && node.radius < clusterRatio * (distance - radius);
         if (far) addFar(node, toCentre, radius);
         if (isCluster) clusters_.push_back(&node);
         return far || isCluster;
     };
-    winding.tree_.forEachLeaf(isFar, [&](const Node& leaf) {
-        addTriangles(leaf);
+    winding.tree_.forEachLeaf(isSettled, [&](const Node& leaf) {
+        addTriangles(leaf, radius);
         return true;
     });
+    clusterBound_ = clusterBound(radius);
 }
 
 // The kernel of WindingCluster about a triangle's centre: its term of first order integrates to 0, and those of order
 // k - 1 > 1 are at most k t^(k - 1) / R^2 with t = radius / R < 1/4, in sum less than 5 t^2 / R^2.
-void WindingInBall::addTriangles(const Node& leaf) {
+void WindingInBall::addTriangles(const Node& leaf, double radius) {
     for (std::uint32_t i = leaf.begin; i < leaf.end; ++i) {
         const Corners& t = winding_.triangles_[i];
         const glm::dvec3 a(t[0]), b(t[1]), c(t[2]), centre = (a + b + c) / 3.0;
@@ -56,6 +62,10 @@ void WindingInBall::addTriangles(const Node& leaf) {
         const double area = glm::length(normal);
         const double squared = std::max(
             {glm::dot(a - centre, a - centre), glm::dot(b - centre, b - centre), glm::dot(c - centre, c - centre)});
+        if (const glm::dvec3 toCentre = centre - centre_; isFar(std::sqrt(squared), glm::length(toCentre), radius)) {
+            addFar(WindingCluster(std::span(&t, 1)), toCentre, radius);
+            continue;
+        }
         const double error = 5 * squared * area, reach = std::max(16 * squared, std::sqrt(error / dipoleError));
         triangles_.push_back({centre, normal, area, squared, reach, error, &t});
     }
@@ -64,7 +74,7 @@ void WindingInBall::addTriangles(const Node& leaf) {
 // A displacement d of the point is one of -d of all triangles: the moments of the cluster about its centre, less d, are
 // polynomials in d, and so is the expansion of WindingCluster. Its bound holds for |s - d| in place of |s|, whose
 // square integrates to at most (sqrt(spread) + radius sqrt(area))^2.
-void WindingInBall::addFar(const Node& node, const glm::dvec3& toCentre, double radius) {
+void WindingInBall::addFar(const WindingCluster& node, const glm::dvec3& toCentre, double radius) {
     const double squared = glm::dot(toCentre, toCentre), distance = std::sqrt(squared);
     const double t = (node.radius + radius) / distance, unit = 1 / (4 * glm::pi<double>() * squared);
     const double spread = std::sqrt(node.spread) + radius * std::sqrt(node.area);
@@ -88,12 +98,21 @@ WindingNumber::Estimate WindingInBall::farEstimate(const glm::dvec3& point) cons
 
 // A surface of area A that is nowhere closer than d fills at most A / (4 pi d^2) of all directions. From two radii
 // away and more, as from all clusters, d is at least half the distance from the centre.
+double WindingInBall::clusterBound(double radius) const {
+    double bound = 0;
+    for (const Node* cluster : clusters_) {
+        const double away = glm::length(cluster->centre - centre_) - radius;
+        bound += cluster->area / (glm::pi<double>() * away * away);
+    }
+    return bound;
+}
+
 WindingNumber::Estimate WindingInBall::coarseEstimate(const glm::dvec3& point) const {
-    const auto squaredTo = [&](const glm::dvec3& centre) { return glm::dot(centre - point, centre - point); };
     WindingNumber::Estimate sum = farEstimate(point);
-    for (const Node* cluster : clusters_) sum.error += cluster->area / (glm::pi<double>() * squaredTo(cluster->centre));
+    sum.error += clusterBound_;
     for (const NearTriangle& triangle : triangles_) {
-        const double squared = squaredTo(triangle.centre);
+        const glm::dvec3 away = triangle.centre - point;
+        const double squared = glm::dot(away, away);
         sum.error += squared > 4 * triangle.squaredRadius ? 4 * triangle.area / squared : 0.5;
     }
     return sum;

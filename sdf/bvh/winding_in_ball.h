@@ -27,8 +27,8 @@ class WindingInBall {
     /// on a triangle, up to rounding, where the number jumps.
     WindingNumber::Estimate estimate(const glm::dvec3& point) const;
 
-    /// As estimate(), in a tenth of the time: clusters and triangles near the ball only add to the error bound,
-    /// by their area and distance.
+    /// As estimate(), in a tenth of the time: clusters and triangles near the ball only add to the error bound, by their area and
+    /// distance.
     WindingNumber::Estimate coarseEstimate(const glm::dvec3& point) const;
 
   private:
@@ -45,8 +45,9 @@ class WindingInBall {
         const Corners* corners;
     };
 
-    void addFar(const Node& node, const glm::dvec3& toCentre, double radius);
-    void addTriangles(const Node& leaf);
+    void addFar(const WindingCluster& node, const glm::dvec3& toCentre, double radius);
+    void addTriangles(const Node& leaf, double radius);
+    double clusterBound(double radius) const;
     WindingNumber::Estimate farEstimate(const glm::dvec3& point) const;
 
     const WindingNumber& winding_;
@@ -58,6 +59,7 @@ class WindingInBall {
     // near the ball
     std::vector<const Node*> clusters_;
     std::vector<NearTriangle> triangles_;
+    double clusterBound_;  // of the winding number of the clusters, anywhere in the ball
 };
 
 }  // namespace bilayer::detail

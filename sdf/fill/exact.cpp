@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/base/box_relations.h"
 #include "sdf/base/progress.h"
 #include "sdf/fill/block_bins.h"
 #include "sdf/fill/certificate.h"
@@ -30,6 +31,8 @@ namespace {
 constexpr double maxPieceEdge = 16;
 /// Maximum count of paths that are tried before the winding number of the whole mesh.
 constexpr int maxPaths = 16;
+/// Triangles whose boxes are farther than this from a path's are not crossed: above the rounding of floats [voxels].
+constexpr float pathMargin = 1e-3f;
 
 /// Whether the certificate is checked.
 #ifdef BILAYER_VERIFY
@@ -123,6 +126,7 @@ class ExactBrickFiller {
         if ((reaching_.empty() && !verifying) || !wanted(block_, blockSide)) return;
         job_.progress.poll();
         inBrick_ = inBrick;
+        candidates_.clear();
         const bool any = measureBlock({reaching_, s_.clusters.clusters().data(), s_.clusters.members().data(),
                                        s_.pieces.data(), block_, glm::vec3(inBrick), job_.reach},
                                       found_);
@@ -186,14 +190,14 @@ class ExactBrickFiller {
 
     // Tries straight paths to voxels of known sign that are far from the surface, at most maxPaths.
     std::optional<bool> insideByPaths(const glm::ivec3& from, const BlockMask& outside, const BlockMask& inside) {
-        findCandidates();
+        if (candidates_.empty()) findCandidates();
         int tries = 0;
         for (std::size_t x = 0; x < inside.size(); ++x)
             for (std::uint64_t targets = found_.far[x] & (outside[x] | inside[x]); targets != 0;
                  targets &= targets - 1) {
                 const int bit = std::countr_zero(targets);
                 const bool knownInside = (inside[x] >> bit) & 1;
-                const auto winding = windingAtStart(inBlock(int(x) * 64 + bit) - from, knownInside ? 1 : 0);
+                const auto winding = windingAtStart(from, inBlock(int(x) * 64 + bit), knownInside ? 1 : 0);
                 if (winding && (*winding == 0 || *winding == 1)) return *winding == 1;
                 if (++tries == maxPaths) return std::nullopt;
             }
@@ -202,24 +206,39 @@ class ExactBrickFiller {
 
     // The triangles that reach the block, each once: those that paths within it may cross.
     void findCandidates() {
-        candidates_.clear();
         forEachNear([](const glm::vec3&, float) { return true; },
-                    [&](std::uint32_t triangle) { candidates_.push_back(triangle); });
-        std::sort(candidates_.begin(), candidates_.end());
-        candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
+                    [&](std::uint32_t triangle) {
+                        candidates_.push_back({triangle, {}});
+                    });
+        const auto key = [](const PathCandidate& candidate) { return candidate.triangle; };
+        std::ranges::sort(candidates_, {}, key);
+        const auto repeated = std::ranges::unique(candidates_, {}, key);
+        candidates_.erase(repeated.begin(), repeated.end());
+        side_.begin(glm::dvec3(block_));
+        for (PathCandidate& candidate : candidates_)
+            for (const glm::dvec3& corner : side_.cornersOf(candidate.triangle)) candidate.box.add(glm::vec3(corner));
     }
 
-    // Returns the winding number at the start of a straight path from the current point, given the number at its end.
-    // The path lies in the block.
-    std::optional<int> windingAtStart(const glm::ivec3& path, int atEnd) const {
+    // Returns the winding number at the start of a straight path in the block, given the number at its end.
+    std::optional<int> windingAtStart(const glm::ivec3& from, const glm::ivec3& to, int atEnd) {
+        const Bounds path{glm::vec3(glm::min(from, to)) - pathMargin, glm::vec3(glm::max(from, to)) + pathMargin};
+        side_.begin(glm::dvec3(block_ + from));
         int winding = atEnd;
-        for (const std::uint32_t triangle : candidates_) {
-            const std::optional<int> crossing = segmentCrossing(side_.cornersOf(triangle), glm::dvec3(path));
+        for (const PathCandidate& candidate : candidates_) {
+            if (!overlap(candidate.box, path)) continue;
+            const std::optional<int> crossing =
+                segmentCrossing(side_.cornersOf(candidate.triangle), glm::dvec3(to - from));
             if (!crossing) return std::nullopt;
             winding += *crossing;
         }
         return winding;
     }
+
+    /// A triangle that paths within the block may cross.
+    struct PathCandidate {
+        std::uint32_t triangle;
+        Bounds box;  ///< relative to the block [voxels]
+    };
 
     const MeshJob& job_;
     const TriangleBins& bins_;
@@ -230,7 +249,7 @@ class ExactBrickFiller {
     std::optional<BlockCheck> check_;  ///< of the brick, while verifying
     ClosestSide side_;
     BlockDistances found_;
-    std::vector<std::uint32_t> candidates_;
+    std::vector<PathCandidate> candidates_;
     std::span<const std::uint32_t> reaching_;  // clusters of the current block
     glm::ivec3 origin_{0}, block_{0}, inBrick_{0};
     int blocks_ = 0;

@@ -21,6 +21,10 @@ namespace {
 const glm::dvec3 rayDirections[] = {
     {1, 0.0137, 0.0071}, {-1, 0.0113, -0.0239}, {1, -0.0317, 0.0193}, {-1, -0.0071, 0.0411}};
 
+/// Points that are decided by rays through all triangles. It takes about as long to build the hierarchy, which decides
+/// each further point in a moment. Both have the same answer, so it does not matter which thread asks first.
+constexpr int pointsByRays = 64;
+
 struct Passes {
     int sum = 0;
     bool clear = true;
@@ -41,7 +45,7 @@ bool FallbackSign::isInside(const glm::dvec3& point) {
             beyond_ = 2 * (glm::length(glm::dvec3(bounds(mesh_).size())) + 2 * reach_);
         });
     });
-    if (closed_)
+    if (closed_ && byRays_++ < pointsByRays)
         for (const glm::dvec3& direction : rayDirections)
             if (const auto winding = windingByRay(point, beyond_ * direction)) return *winding > 0;
     std::call_once(made_, [&] { tbb::this_task_arena::isolate([&] { winding_.emplace(mesh_, &progress_); }); });

@@ -2,6 +2,7 @@
 // Fallback sign test for the rare voxels that nearby triangles leave undecided: the winding number of the whole mesh.
 #pragma once
 
+#include <atomic>
 #include <glm/vec3.hpp>
 #include <mutex>
 #include <optional>
@@ -11,9 +12,9 @@
 
 namespace bilayer::detail {
 
-/// Counts the signed crossings of a ray through a closed mesh. For other meshes, and if all rays pass too close to
-/// edges, evaluates the winding number with a hierarchy. The hierarchy is built on first use, which most meshes never
-/// need. Thread-safe.
+/// Counts the signed crossings of a ray through a closed mesh. For other meshes, after many points, and if all rays
+/// pass too close to edges, evaluates the winding number with a hierarchy. The hierarchy is built on first use, which
+/// most meshes never need. Thread-safe.
 class FallbackSign {
   public:
     /// Uses the job's mesh, and adds to its count of undecided voxels.
@@ -37,7 +38,8 @@ class FallbackSign {
     double reach_;  // maximum distance of queried points from the mesh [m]
     std::once_flag looked_, made_;
     bool closed_ = false;
-    double beyond_ = 0;  // length of a ray that leaves the mesh for certain [m]
+    std::atomic<int> byRays_ = 0;  // points so far
+    double beyond_ = 0;            // length of a ray that leaves the mesh for certain [m]
     std::optional<WindingNumber> winding_;
 };
 
