@@ -27,8 +27,8 @@ class WindingInBall {
     /// on a triangle, up to rounding, where the number jumps.
     WindingNumber::Estimate estimate(const glm::dvec3& point) const;
 
-    /// As estimate(), in a tenth of the time: clusters and triangles near the ball only add to the error bound, by their area and
-    /// distance.
+    /// As estimate(), in a tenth of the time: clusters and triangles near the ball only add to the error bound, by
+    /// their area and distance.
     WindingNumber::Estimate coarseEstimate(const glm::dvec3& point) const;
 
   private:
