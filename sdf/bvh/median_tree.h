@@ -53,9 +53,9 @@ class MedianTree {
     /// nodes are built, in parallel.
     static std::size_t nodeCount(std::size_t items, std::size_t leafItems) {
         if (items <= leafItems) return 1;
-        // Halves differ by at most one, so the sizes on a level are two consecutive integers.
-        std::size_t nodes = 0, small = items, fewer = 1,
-                    more = 0;  // `fewer` nodes of `small` items, `more` of small + 1
+        // Halves differ by at most one, so the sizes on a level are two consecutive integers: `fewer` nodes have
+        // `small` items, and `more` nodes have one more.
+        std::size_t nodes = 0, small = items, fewer = 1, more = 0;
         while (fewer + more > 0) {
             nodes += fewer + more;
             std::size_t nextFewer = 0, nextMore = 0;
