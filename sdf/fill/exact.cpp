@@ -210,10 +210,9 @@ class ExactBrickFiller {
                     [&](std::uint32_t triangle) {
                         candidates_.push_back({triangle, {}});
                     });
-        const auto key = [](const PathCandidate& candidate) { return candidate.triangle; };
-        std::ranges::sort(candidates_, {}, key);
-        const auto repeated = std::ranges::unique(candidates_, {}, key);
-        candidates_.erase(repeated.begin(), repeated.end());
+        std::ranges::sort(candidates_, {}, &PathCandidate::triangle);
+        const auto same = [](const PathCandidate& a, const PathCandidate& b) { return a.triangle == b.triangle; };
+        candidates_.erase(std::unique(candidates_.begin(), candidates_.end(), same), candidates_.end());
         side_.begin(glm::dvec3(block_));
         for (PathCandidate& candidate : candidates_)
             for (const glm::dvec3& corner : side_.cornersOf(candidate.triangle)) candidate.box.add(glm::vec3(corner));
