@@ -6,7 +6,7 @@
 #include <glm/vec3.hpp>
 #include <span>
 
-#include "collider/field/field_layout.h"
+#include "collider/field/layout/field_layout.h"
 
 namespace bilayer::bench {
 

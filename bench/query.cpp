@@ -22,7 +22,7 @@
 #include "bench/program.h"
 #include "bench/questions.h"
 #include "bench/race.h"
-#include "collider/field/field_layout.h"
+#include "collider/field/layout/field_layout.h"
 #include "sdf/base/openvdb.h"
 
 using namespace bilayer;

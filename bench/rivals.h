@@ -11,8 +11,8 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/mesh.h>
-#include "collider/contact/body.h"
-#include "collider/contact/sampled_points.h"
+#include "collider/contact/body/body.h"
+#include "collider/contact/search/sampled_points.h"
 
 namespace bilayer::bench {
 

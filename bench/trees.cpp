@@ -11,7 +11,7 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
-#include "collider/field/mesh_tree.h"
+#include "collider/field/triangles/mesh_tree.h"
 #include "sdf/bvh/median_tree.h"
 #include "sdf/sign/closest_side.h"
 

@@ -17,8 +17,8 @@
 #include "cl/detail/program.h"
 #include "cl/detail/queue_guard.h"
 #include "cl/detail/timing.h"
-#include "collider/field/batch.h"
-#include "collider/field/field_layout.h"
+#include "collider/field/layout/batch.h"
+#include "collider/field/layout/field_layout.h"
 
 namespace bilayer {
 

@@ -19,7 +19,7 @@
 #include "cl/detail/program.h"
 #include "cl/detail/queue_guard.h"
 #include "cl/detail/timing.h"
-#include "collider/contact/sampled_points.h"
+#include "collider/contact/search/sampled_points.h"
 
 namespace bilayer {
 

@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 
 namespace bilayer {
 

@@ -5,12 +5,12 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "collider/contact/body_distance.h"
-#include "collider/contact/body_transform.h"
-#include "collider/contact/collider_data.h"
-#include "collider/contact/mesh_distance.h"
-#include "collider/contact/placed_shapes.h"
-#include "collider/field/field_data.h"
+#include "collider/contact/body/body_transform.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/contact/distance/body_distance.h"
+#include "collider/contact/distance/mesh_distance.h"
+#include "collider/contact/shapes/placed_shapes.h"
+#include "collider/field/samples/field_data.h"
 
 namespace bilayer {
 
@@ -38,8 +38,8 @@ struct Bodies {
 };
 
 /// Of the larger body [m].
-double sizeOf(const Bodies& bodies) {
-    return std::max(detail::sizeOf(bodies.a), detail::sizeOf(bodies.b));
+double lengthOf(const Bodies& bodies) {
+    return std::max(detail::lengthOf(bodies.a), detail::lengthOf(bodies.b));
 }
 
 BodyDistance separated(const Bodies& bodies, const MeshDistance& found) {
@@ -49,7 +49,7 @@ BodyDistance separated(const Bodies& bodies, const MeshDistance& found) {
                         .distance = float(distance),
                         .a = witness(bToWorld, found.a, found.triangleA),
                         .b = witness(bToWorld, found.b, found.triangleB)};
-    if (distance > minDirection * sizeOf(bodies))
+    if (distance > minDirection * lengthOf(bodies))
         answer.normal = bToWorld.rotation * glm::normalize(found.a.position - found.b.position);
     return answer;
 }
@@ -142,7 +142,7 @@ BodyDistance contained(BodyDistance deepest, Overlap overlap) {
 BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& options, DistanceStart* start) {
     for (const Placed* body : {&a, &b}) requireUnitRotation(body->pose);
     const Bodies bodies{a, b, toWorld(a).into(toWorld(b))};
-    const double limit = searchLimit(options, sizeOf(bodies)) / double(b.scale);
+    const double limit = searchLimit(options, lengthOf(bodies)) / double(b.scale);
     const MeshDistance found =
         distanceBetween(a.collider.data().meshTree(), b.collider.data().meshTree(), bodies.aToB, limit,
                         start ? TriangleIndices{start->triangleA, start->triangleB} : TriangleIndices{});

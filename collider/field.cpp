@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "collider/field/field_data.h"
+#include "collider/field/samples/field_data.h"
 #include "sdf/base/method_names.h"
 #include "sdf/sign/sign_choice.h"
 

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "collider/field/moments.h"
+#include "collider/field/layout/moments.h"
 #include "sdf/base/jacobi_rotation.h"
 #include "sdf/mesh/unite.h"
 

@@ -9,25 +9,16 @@
 #include <stdexcept>
 #include <utility>
 
-#include "collider/contact/hull.h"
-#include "collider/contact/shape_data.h"
+#include "collider/contact/shapes/hull.h"
+#include "collider/contact/shapes/shape_data.h"
 #include "sdf/base/finite.h"
+#include "sdf/base/required_numbers.h"
 
 namespace bilayer {
 
 using namespace detail;
 
 namespace {
-
-void requirePositive(float length, const char* name) {
-    if (!(length > 0) || !std::isfinite(length))
-        throw std::invalid_argument(fmt::format("the {} is {}, and must be above 0 and finite", name, length));
-}
-
-void requireNotNegative(float length, const char* name) {
-    if (!(length >= 0) || !std::isfinite(length))
-        throw std::invalid_argument(fmt::format("the {} is {}, and must be 0 or more and finite", name, length));
-}
 
 /// The coordinate of the axis of solids of revolution.
 constexpr int upAxis = 1;
@@ -43,42 +34,42 @@ const Collider* ContactShape::collider() const {
 }
 
 ContactShape ContactShape::sphere(float radius) {
-    requirePositive(radius, "radius");
+    requirePositive(radius, "the radius");
     return ContactShape(ContactShapeData{Convex::segment(upAxis, 0, radius)});
 }
 
 ContactShape ContactShape::box(const glm::vec3& halfExtents) {
-    for (int axis = 0; axis < 3; ++axis) requirePositive(halfExtents[axis], "half extent");
+    for (int axis = 0; axis < 3; ++axis) requirePositive(halfExtents[axis], "the half extent");
     return ContactShape(ContactShapeData{Convex::box(halfExtents)});
 }
 
 ContactShape ContactShape::capsule(float radius, float halfHeight) {
-    requirePositive(radius, "radius");
-    requireNotNegative(halfHeight, "half height");
+    requirePositive(radius, "the radius");
+    requireNotNegative(halfHeight, "the half height");
     return ContactShape(ContactShapeData{Convex::segment(upAxis, halfHeight, radius)});
 }
 
 ContactShape ContactShape::cylinder(float radius, float halfHeight) {
-    requirePositive(radius, "radius");
-    requirePositive(halfHeight, "half height");
+    requirePositive(radius, "the radius");
+    requirePositive(halfHeight, "the half height");
     return ContactShape(ContactShapeData{Convex::revolution(upAxis, halfHeight, radius, radius, 0)});
 }
 
 ContactShape ContactShape::cone(float radius, float halfHeight) {
-    requirePositive(radius, "radius");
-    requirePositive(halfHeight, "half height");
+    requirePositive(radius, "the radius");
+    requirePositive(halfHeight, "the half height");
     return ContactShape(ContactShapeData{Convex::revolution(upAxis, halfHeight, radius, 0, 0)});
 }
 
 ContactShape ContactShape::hull(std::span<const glm::vec3> points, float radius) {
-    requireNotNegative(radius, "radius");
+    requireNotNegative(radius, "the radius");
     return ContactShape(ContactShapeData{Convex::hull(convexHullOf(points), radius)});
 }
 
 ContactShape ContactShape::spheres(std::span<const SphereOfHull> spheres) {
     float largest = 0;
     for (const SphereOfHull& sphere : spheres) {
-        requireNotNegative(sphere.radius, "radius of a sphere");
+        requireNotNegative(sphere.radius, "the radius of a sphere");
         if (!isFinite(sphere.centre)) throw std::invalid_argument("the centre of a sphere is not finite");
         largest = std::max(largest, sphere.radius);
     }
@@ -88,7 +79,7 @@ ContactShape ContactShape::spheres(std::span<const SphereOfHull> spheres) {
 
 ContactShape ContactShape::plane(const glm::vec3& normal, float offset) {
     const float length = glm::length(normal);
-    requirePositive(length, "length of the normal");
+    requirePositive(length, "the length of the normal");
     if (!std::isfinite(offset)) throw std::invalid_argument("the offset of the plane is not finite");
     return ContactShape(ContactShapeData{HalfSpace{normal / length, offset}});
 }

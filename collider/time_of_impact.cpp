@@ -13,11 +13,11 @@
 #include <utility>
 #include <variant>
 
-#include "collider/contact/advancement.h"
-#include "collider/contact/body_transform.h"
-#include "collider/contact/penetration.h"
-#include "collider/contact/placed_shapes.h"
-#include "collider/contact/shape_data.h"
+#include "collider/contact/body/body_transform.h"
+#include "collider/contact/impact/advancement.h"
+#include "collider/contact/impact/penetration.h"
+#include "collider/contact/shapes/placed_shapes.h"
+#include "collider/contact/shapes/shape_data.h"
 #include "sdf/base/finite.h"
 
 namespace bilayer {
@@ -55,7 +55,7 @@ struct Extent {
 Extent extentOf(const Placed& body) {
     const Bounds& bounds = body.collider.bounds();
     const auto scale = double(body.scale);
-    return {scale * glm::length(glm::dvec3(glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper)))), sizeOf(body),
+    return {scale * glm::length(glm::dvec3(glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper)))), lengthOf(body),
             scale * double(body.collider.field().voxelSize())};
 }
 
@@ -92,7 +92,7 @@ struct MovingBody {
     SweptShape swept() const { return {body.shape, sweep, {}, body.scale}; }
 };
 
-Impact firstTouch(const MovingBody& a, const MovingBody& b, float askedTolerance) {
+Impact timeOfTouch(const MovingBody& a, const MovingBody& b, float askedTolerance) {
     const Extent ofA = extentOf(a.body, a.motion), ofB = extentOf(b.body, b.motion);
     const double tolerance = toleranceFor(ofA, ofB, askedTolerance);
     const double approach = maxApproach(a.sweep, ofA.radius, b.sweep, ofB.radius);
@@ -127,7 +127,7 @@ Impact penetration(const MovingBody& a, const MovingBody& b) {
 Impact timeOfImpact(const PlacedShape& a, const PlacedShape& b, const ImpactOptions& options) {
     orderOf(a, b);
     const MovingBody movingA(a, "motion a"), movingB(b, "motion b");
-    return options.penetration ? penetration(movingA, movingB) : firstTouch(movingA, movingB, options.tolerance);
+    return options.penetration ? penetration(movingA, movingB) : timeOfTouch(movingA, movingB, options.tolerance);
 }
 
 Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options) {

@@ -239,9 +239,9 @@ void findThinWalls(const TriangleTree& tree, const Measures& measures, float wal
 
 }  // namespace
 
-MeshReport inspect(const Mesh& input, float wall, const std::function<bool(float)>& listener) {
+MeshReport inspect(const Mesh& input, float wall, const std::function<bool(float)>& callback) {
     validate(input);
-    Progress progress(listener);
+    Progress progress(callback);
     progress.begin(phases);
     MeshReport report;
     const std::optional<Mesh> welded = weldUnlessDone(input);

@@ -3,10 +3,10 @@
 
 #include <string>
 
+#include "sdf/io/formats/mesh_readers.h"
 #include "sdf/io/input_file.h"
-#include "sdf/io/mesh_readers.h"
-#include "sdf/io/polygons.h"
-#include "sdf/io/scene_io.h"
+#include "sdf/io/polygon/polygons.h"
+#include "sdf/io/scenes/scene_io.h"
 
 namespace bilayer {
 

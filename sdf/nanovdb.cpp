@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bilayer/sdf/nanovdb.h>
 
-#include <fmt/format.h>
 #include <nanovdb/util/GridHandle.h>
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 
-#include <fstream>
-#include <new>
-#include <stdexcept>
+#include <ostream>
 #include <vector>
 
 #include <bilayer/sdf/grids.h>
@@ -70,21 +67,10 @@ std::optional<NanoGrid> trianglesToNanoVdb(const LevelSet& levelSet) {
 }
 
 void writeNanoVdb(const std::filesystem::path& path, const LevelSet& levelSet) {
-    AtomicFile file(path);
     std::vector<Handle> grids;
     grids.push_back(convertInWorld(levelSet.grids().distance, levelSet));
     if (levelSet.grids().triangle) grids.push_back(convertInWorld(levelSet.grids().triangle, levelSet));
-    try {
-        std::ofstream stream(file.temporary(), std::ios::binary);
-        stream.exceptions(std::ios::failbit | std::ios::badbit);
-        nanovdb::io::writeGrids(stream, grids);
-        stream.close();
-    } catch (const std::bad_alloc&) {
-        throw;
-    } catch (const std::exception&) {
-        throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-    }
-    file.commit();
+    writeWhole(path, [&](std::ostream& stream) { nanovdb::io::writeGrids(stream, grids); });
 }
 
 }  // namespace bilayer

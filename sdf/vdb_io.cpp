@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bilayer/sdf/vdb_io.h>
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <fstream>
 #include <memory>
-#include <new>
-#include <stdexcept>
+#include <ostream>
 #include <string>
 #include <utility>
 
@@ -17,8 +13,8 @@
 #include "sdf/grid/vdb_grids.h"
 #include "sdf/io/atomic_file.h"
 #include "sdf/io/input_file.h"
-#include "sdf/io/vdb_archive.h"
-#include "sdf/io/vdb_checksum.h"
+#include "sdf/io/vdb/vdb_archive.h"
+#include "sdf/io/vdb/vdb_checksum.h"
 
 namespace bilayer {
 
@@ -29,22 +25,13 @@ openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const Le
 }
 
 void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
-    AtomicFile file(path);
-    try {
-        std::ofstream stream(file.temporary(), std::ios::binary);
-        stream.exceptions(std::ios::failbit | std::ios::badbit);
+    writeWhole(path, [&](std::ostream& stream) {
         ChecksumBuffer buffer(*stream.rdbuf());
         std::ostream archive(&buffer);
         archive.exceptions(std::ios::failbit | std::ios::badbit);
         writeArchive(archive, grids);
         stream << buffer.line();
-        stream.close();
-    } catch (const std::bad_alloc&) {
-        throw;
-    } catch (const std::exception&) {
-        throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-    }
-    file.commit();
+    });
 }
 
 float storedErrorBound(const LevelSet& levelSet, const VdbOptions& options) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer batch`: a library of meshes becomes a folder of fields.
-// Tested by tests/tools/batch.cpp through run().
+// Tested by tests/tools/batch.cpp through the program.
 #include <fmt/format.h>
 #include <sched.h>
 #include <signal.h>

@@ -17,7 +17,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
-#include "collider/contact/accuracy_names.h"
+#include "collider/contact/body/accuracy_names.h"
 #include "sdf/base/method_names.h"
 #include "sdf/fill/double_layer.h"
 #include "sdf/sign/sign_choice.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The options of a build on the command line, and the steps of a build, for the commands that build fields.
-// Tested by tests/tools/build.cpp through run().
+// Tested by tests/tools/build.cpp through the program.
 #pragma once
 
 #include <CLI/CLI.hpp>

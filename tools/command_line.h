@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs the commands of a program: signals, standard streams, exit status.
-// Tested by tests/tools/usage.cpp through run().
+// Tested by tests/tools/usage.cpp through the program.
 #pragma once
 
 #include <CLI/CLI.hpp>

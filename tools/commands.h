@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The commands of the command line program `bilayer`. Each function adds one command, whose callback does the work. The
 // callback throws CLI::ParseError for wrong usage, and any other exception if the input or the machine is at fault.
-// Tested by tests/tools/usage.cpp through run().
+// Tested by tests/tools/usage.cpp through the program.
 #pragma once
 
 #include <fmt/format.h>

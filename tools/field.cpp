@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer query`, `surface` and `export`: field values as numbers, as a mesh, and as grids for a GPU.
-// Tested by tests/tools/field.cpp through run().
+// Tested by tests/tools/field.cpp through the program.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -16,7 +16,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/nanovdb.h>
 #include <bilayer/sdf/surface.h>
-#include "collider/contact/body.h"
+#include "collider/contact/body/body.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/base/usable_memory.h"
 #include "sdf/tiles/tile_manifest.h"

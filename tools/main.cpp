@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer`: fields from meshes on the command line. Exit status 0: done; 1: input or machine at fault, one line on
 // stderr; 2: wrong usage.
-// Tested by tests/tools/main.cpp through run().
+// Tested by tests/tools/main.cpp through the program.
 #include "tools/command_line.h"
 #include "tools/commands.h"
 #include "tools/tiles/ranks.h"

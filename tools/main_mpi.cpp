@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `mpirun -n R bilayer-mpi build MESH --tiles AxBxC -o FOLDER ...`: the tiles of `bilayer build`, spread over the ranks
 // of MPI. The options and the exit status are those of `bilayer`. tests/tools/tiles_mpi.sh runs it.
-// Tested by tests/tools/tiles.cpp through run().
+// Tested by tests/tools/tiles.cpp through the program.
 #include "integration/mpi/session.h"
 #include "tools/command_line.h"
 #include "tools/commands.h"

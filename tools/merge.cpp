@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer merge`: the tiles of a field become one .vdb file.
-// Tested by tests/tools/tiles.cpp through run().
+// Tested by tests/tools/tiles.cpp through the program.
 #include <fmt/format.h>
 
 #include <memory>

@@ -10,9 +10,9 @@
 
 #include "sdf/base/hash.h"
 #include "sdf/io/content_hash.h"
-#include "sdf/io/gltf_buffers.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/mapped_file.h"
+#include "sdf/io/scenes/gltf_buffers.h"
 
 namespace bilayer::tools {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is known of a mesh file before it is read: the hash of its contents, and the memory that reading it takes.
-// Tested by tests/tools/batch.cpp and tiles.cpp through run().
+// Tested by tests/tools/batch.cpp and tiles.cpp through the program.
 #pragma once
 
 #include <cstdint>

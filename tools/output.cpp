@@ -11,8 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <stdexcept>
+#include <ostream>
 
 #include "sdf/base/method_names.h"
 #include "sdf/io/atomic_file.h"
@@ -312,12 +311,7 @@ void requireWritable(const std::filesystem::path& path) {
 }
 
 void writeText(const std::filesystem::path& path, const std::string& text) {
-    AtomicFile file(path);
-    std::ofstream stream(file.temporary(), std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-    file.commit();
+    writeWhole(path, [&](std::ostream& stream) { stream << text; });
 }
 
 std::uint64_t peakMemory() {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Output of the commands: tables for people, JSON for programs, a progress bar on a terminal.
-// Tested by tests/tools/build.cpp through run().
+// Tested by tests/tools/build.cpp through the program.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@
 #include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
-#include "collider/contact/body.h"
+#include "collider/contact/body/body.h"
 #include "sdf/base/stopwatch.h"
 
 namespace bilayer::tools {

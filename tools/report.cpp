@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer inspect`, `info` and `devices`: the read-only commands.
-// Tested by tests/tools/report.cpp through run().
+// Tested by tests/tools/report.cpp through the program.
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/tools/Diagnostics.h>
@@ -16,7 +16,7 @@
 #include <bilayer/integration/bullet/settings.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "collider/contact/body.h"
+#include "collider/contact/body/body.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/tiles/tile_manifest.h"
 #include "tools/commands.h"

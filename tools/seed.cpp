@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bilayer seed`: combines meshes and fields into one liquid level set, optionally with marker particles.
-// Tested by tests/tools/seed.cpp through run().
+// Tested by tests/tools/seed.cpp through the program.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "collider/contact/body.h"
+#include "collider/contact/body/body.h"
 #include "integration/fluid/detail/liquid_copy.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/leaf/build_options.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The version of the program, and of what it was built with.
-// Tested by tests/tools/usage.cpp through run().
+// Tested by tests/tools/usage.cpp through the program.
 #include <Imath/ImathConfig.h>
 #include <LinearMath/btScalar.h>
 #include <assimp/version.h>

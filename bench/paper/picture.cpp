@@ -14,7 +14,7 @@
 #include <stdexcept>
 
 #include <bilayer/sdf/grids.h>
-#include "collider/field/mesh_rays.h"
+#include "collider/field/triangles/mesh_rays.h"
 #include "sdf/base/openvdb.h"
 
 namespace bilayer::paper {

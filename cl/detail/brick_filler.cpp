@@ -26,6 +26,7 @@
 #include "cl/detail/timing.h"
 #include "sdf/base/bit_orders.h"
 #include "sdf/base/progress.h"
+#include "sdf/fill/layer_samples.h"
 
 namespace bilayer::detail {
 
@@ -112,9 +113,8 @@ float reachOf(const FillJob& job) {
 
 // Count of the indices to the samples of each cell of a brick: cellsFor() of samples.cl.
 std::uint64_t sampleCells(const BrickGrid& grid) {
-    constexpr int cellSide = 4;  // [voxels]
-    const int around = 1 + int(std::floor((float(grid.reach) - 0.4f) / float(cellSide)));
-    const auto side = std::uint64_t((1 << grid.shift) / cellSide + 2 * around);
+    const int around = LayerSamples::cellsAround(float(grid.reach));
+    const auto side = std::uint64_t((1 << grid.shift) / LayerSamples::cellSide + 2 * around);
     return side * side * side + 2;
 }
 

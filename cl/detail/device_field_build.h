@@ -6,7 +6,7 @@
 #include <bilayer/sdf/build.h>
 #include "cl/detail/memory.h"
 #include "cl/detail/timing.h"
-#include "collider/field/field_layout.h"
+#include "collider/field/layout/field_layout.h"
 
 namespace bilayer::detail {
 

@@ -71,14 +71,12 @@ void writeBinary(const std::filesystem::path& path, const cl::Program& program) 
     try {
         const Binary binary = program.getInfo<CL_PROGRAM_BINARIES>().front();
         std::filesystem::create_directories(path.parent_path());
-        AtomicFile target(path);
-        std::ofstream file(target.temporary(), std::ios::binary);
         const std::uint64_t sum = checksum(viewed(binary));
-        file.write(fileMark.data(), std::streamsize(fileMark.size()));
-        file.write(reinterpret_cast<const char*>(&sum), sizeof sum);
-        file.write(viewed(binary).data(), std::streamsize(binary.size()));
-        file.close();
-        if (file) target.commit();
+        writeWhole(path, [&](std::ostream& file) {
+            file.write(fileMark.data(), std::streamsize(fileMark.size()));
+            file.write(reinterpret_cast<const char*>(&sum), sizeof sum);
+            file.write(viewed(binary).data(), std::streamsize(binary.size()));
+        });
     } catch (const cl::Error&) {
     } catch (const std::runtime_error&) {
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples a field that is laid out as in collider/field/field_layout.h. Does the same operations as
-// collider/field/field_sample.cpp.
+// Samples a field that is laid out as in collider/field/layout/field_layout.h. Does the same operations as
+// collider/field/samples/field_sample.cpp.
 #include "layout.cl"
 
 // [voxels]

@@ -9,7 +9,7 @@
 #define NEEDED 0
 // bandEdge of sdf/leaf/band.h [voxels].
 #define BAND_EDGE 1e-5f
-// As in collider/field/coarse_distance.cpp, clearance.h and field_layout.cpp.
+// As in collider/field/layout/coarse_distance.cpp, clearance.h and field_layout.cpp.
 #define MAX_CELLS 16
 // Maximum stored distance [CLEARANCE_STEPS].
 #define MAX_CLEARANCE_STEPS 127
@@ -297,7 +297,7 @@ kernel void initialiseCells(Frame frame, float far, global const int* directory,
     centres[centreOf(cell, blocks)] = minValue < 0 ? -1 : 1;
 }
 
-// Propagates squared distances along one more axis: transformRow() of collider/field/coarse_distance.cpp. A work-item
+// Propagates squared distances along one more axis: transformRow() of collider/field/layout/coarse_distance.cpp. A work-item
 // does a coarse cell.
 kernel void transformCells(Frame frame, int axis, global const float* from, global float* to) {
     const int3 size = COARSE_ALONG * vload3(0, frame.blocks);

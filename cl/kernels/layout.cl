@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A field laid out on a device, as in collider/field/field_layout.h.
+// A field laid out on a device, as in collider/field/layout/field_layout.h.
 #include "common.cl"
 
 // A block with its apron, the upper neighbours' voxels that complete its last cells.
@@ -13,7 +13,7 @@
 #define COARSE_ALONG 2
 #define CLEARANCE_STEPS 8
 
-// FieldFrame of collider/field/field_layout.h; metres and voxels as there.
+// FieldFrame of collider/field/layout/field_layout.h; metres and voxels as there.
 typedef struct {
     double origin[3], perMetre;
     int blocks[3];

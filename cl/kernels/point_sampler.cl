@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Samples points of bodies in the fields of other bodies. Does the same operations as
-// collider/contact/points_in_field.h. A bounding sphere of points that is certainly far from the other body is culled.
+// collider/contact/search/points_in_field.h. A bounding sphere of points that is certainly far from the other body is culled.
 #include "field.cl"
 
 // How far the interpolant may be below the distance [voxels], and a generous bound of the rounding of a bounding

@@ -8,17 +8,17 @@
 #include <optional>
 #include <utility>
 
-#include "collider/contact/closest_points.h"
-#include "collider/contact/collider_data.h"
-#include "collider/contact/contact_cache.h"
-#include "collider/contact/contact_range.h"
-#include "collider/contact/finite_contacts.h"
-#include "collider/contact/normal_filter.h"
-#include "collider/contact/placed_shapes.h"
-#include "collider/contact/points_in_field.h"
-#include "collider/contact/sampled_contacts.h"
-#include "collider/contact/surface_query.h"
-#include "collider/field/field_data.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/contact/distance/closest_points.h"
+#include "collider/contact/reduction/contact_cache.h"
+#include "collider/contact/reduction/finite_contacts.h"
+#include "collider/contact/search/contact_range.h"
+#include "collider/contact/search/normal_filter.h"
+#include "collider/contact/search/points_in_field.h"
+#include "collider/contact/search/sampled_contacts.h"
+#include "collider/contact/search/surface_query.h"
+#include "collider/contact/shapes/placed_shapes.h"
+#include "collider/field/samples/field_data.h"
 
 namespace bilayer::detail {
 
@@ -94,7 +94,8 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
             return facesEdgeObliquely(body.pose.toWorld(body.scale * point.position), own,
                                       sample.distance * other.scale, normal, holdsAt);
         };
-        const bool isSeparated = sample.distance > -minFaceDepth * other.collider.field().voxelSize() && !point.isSharp;
+        const bool isSeparated =
+            sample.distance > -minFaceDepthVoxels * other.collider.field().voxelSize() && !point.isSharp;
         return passesNormalFilter(options, normal, own, body.motion.rotation - other.motion.rotation, isSeparated,
                                   facesEdge);
     };
@@ -155,7 +156,7 @@ ContactReport collideFound(const Placed& a, const Placed& b, const ContactOption
     };
     const std::size_t first = contacts.size();
     const ContactReport report = addContacts(a, b, options, ContactRange::band, contacts, visit(ofA), visit(ofB));
-    removeInfinite(contacts, first);
+    removeNonFinite(contacts, first);
     return report;
 }
 
@@ -171,7 +172,7 @@ ContactReport collideWithin(ContactRange range, const Placed& a, const Placed& b
     const ContactReport report = addContacts(a, b, options, range, contacts, visit(lists ? &lists->ofA : nullptr),
                                              visit(lists ? &lists->ofB : nullptr));
     if (options.exact) refineClosest(std::span(contacts).subspan(first), a, b);
-    removeInfinite(contacts, first);
+    removeNonFinite(contacts, first);
     if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, relativeRotation(a.motion, b.motion), cache);
     return report;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contacts between two shapes, one of them a collider.
-// Tested by tests/collider/shapes.cpp through collide().
+#include "collider/contact/shape_contacts.h"
+
 #include <bilayer/collider/contact.h>
 
 #include <fmt/format.h>
@@ -11,11 +12,13 @@
 #include <stdexcept>
 #include <variant>
 
-#include "collider/contact/contact_reduction.h"
-#include "collider/contact/finite_contacts.h"
-#include "collider/contact/narrow_phase.h"
-#include "collider/contact/placed_shapes.h"
-#include "collider/contact/shape_data.h"
+#include "collider/contact/open_surface/triangle_contacts.h"
+#include "collider/contact/reduction/contact_reduction.h"
+#include "collider/contact/reduction/finite_contacts.h"
+#include "collider/contact/search/convex_contacts.h"
+#include "collider/contact/search/half_space_contacts.h"
+#include "collider/contact/shapes/placed_shapes.h"
+#include "collider/contact/shapes/shape_data.h"
 #include "sdf/base/unit_tolerance.h"
 
 namespace bilayer {
@@ -106,7 +109,7 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
         order.isSwapped ? collideShape(b, placed(a), options, contacts) : collideShape(a, placed(b), options, contacts);
     if (order.isSwapped)
         for (std::size_t i = first; i < contacts.size(); ++i) contacts[i] = swappedContact(contacts[i]);
-    removeInfinite(contacts, first);
+    removeNonFinite(contacts, first);
     if (options.reduced) reduceFrom(first, contacts, a.pose, b.pose, relativeRotation(a.motion, b.motion), cache);
     return report;
 }

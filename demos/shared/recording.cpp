@@ -290,12 +290,7 @@ void Recording::write(const std::filesystem::path& path) const {
     replace(page, "/*CONTROLS*/", readText(std::string(threeFolder) + "examples/js/controls/OrbitControls.js"));
     replace(page, "/*DATA*/", data());
 
-    AtomicFile target(path);
-    std::ofstream file(target.temporary(), std::ios::binary);
-    file << page;
-    file.close();
-    if (!file) throw std::runtime_error(path.string() + ": cannot be written");
-    target.commit();
+    writeWhole(path, [&](std::ostream& file) { file << page; });
 }
 
 }  // namespace bilayer::demo

@@ -2,8 +2,8 @@
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/draw.h>
 
-#include "collider/contact/collider_data.h"
-#include "collider/field/field_data.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/field/samples/field_data.h"
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>

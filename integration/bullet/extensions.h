@@ -29,15 +29,14 @@ struct ExtensionOptions {
     /// - btGImpactMeshShape, which still gets the Dispatcher's speculative contacts.
     bool continuousCollision = true;
 
-    /// Rest stabilisation: bodies at rest keep their positions. Bullet's solver leaves them some velocity in each step.
-    /// It is rounding and has no direction, but in minutes it moves a body by 0.1 voxels, and then part of a pile
-    /// slides.
+    /// Rest stabilisation: bodies at rest keep their positions. Rounding in Bullet's solver leaves them a small random
+    /// velocity in each step. In minutes it moves a body by 0.1 voxels, and then part of a pile slides.
     ///
-    /// A body is held if its speed at the end of a step is below 5 % of the speed that gravity adds in one step, and
-    /// does not grow. The speed is that of its farthest point; the limit is 2 mm/s at 240 steps a second and 8 mm/s at
-    /// 60. A held body keeps its position to the bit, and keeps its velocity. It is released when its speed changes by
-    /// 5 % for four steps, or grows to 15 %. It then gets the velocity that it had when it was first held, so that an
-    /// oscillating body gains no energy.
+    /// Speeds are those of a body's farthest point, in percent of the speed that gravity adds in one step. A body is
+    /// held if its speed at the end of a step is below 5 % and does not grow: 2 mm/s at 240 steps a second, 8 mm/s
+    /// at 60. A held body keeps its position to the bit, and keeps its velocity. It is released when its speed changes
+    /// by 5 % for four steps, or grows to 15 %. It then gets the velocity that it had when it was first held, so that
+    /// an oscillating body gains no energy.
     ///
     /// Never held are bodies without weight, bodies that a constraint or a force moves, and bodies in contact with one
     /// of these or with a moving kinematic body.
@@ -85,10 +84,11 @@ struct ExtensionOptions {
     bool gyroscopicIntegration = false;
 };
 
-/// Extends a world from its construction on. The world must outlive it. The user's own tick callbacks keep working,
-/// whether they are set before or after: pre-tick callbacks run before the extensions, others after them. A
-/// pre-tick callback that is set later keeps smooth ground and gyroscopic integration out of the next step. So set it
-/// once: set again before each step, it keeps them out of all.
+/// Extends a world from its construction on. The world must outlive it.
+///
+/// The user's own tick callbacks keep working, whether they are set before or after: pre-tick callbacks run before the
+/// extensions, others after them. Set a pre-tick callback once, not before each step: smooth ground and gyroscopic
+/// integration skip the first step after it is set.
 ///
 /// A world may have several of these; smooth ground acts once. Only one of them may have
 /// ExtensionOptions::gyroscopicIntegration, since each integrator takes over the rotation of all bodies: the

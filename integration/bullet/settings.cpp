@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "collider/field/interpolant.h"
+#include "collider/field/layout/interpolant.h"
 #include "sdf/base/voxel_limits.h"
 
 namespace bilayer::bullet {

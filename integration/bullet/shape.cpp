@@ -18,10 +18,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "collider/contact/collider_data.h"
-#include "collider/field/field_data.h"
-#include "collider/field/mesh_rays.h"
-#include "collider/field/triangle_tests.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/field/samples/field_data.h"
+#include "collider/field/triangles/mesh_rays.h"
+#include "collider/field/triangles/triangle_tests.h"
 #include "integration/bullet/detail/casts.h"
 #include "integration/bullet/detail/convert.h"
 #include "integration/bullet/detail/missing_dispatcher.h"

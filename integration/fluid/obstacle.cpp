@@ -187,7 +187,7 @@ void checkCells(const SolidOptions& options, const Transform& cells) {
             fmt::format("halfWidthVoxels must be in 3..1000, not {:g}", options.halfWidthVoxels));
 }
 
-// The progress of one of the two equal halves of the work; none if there is no listener.
+// The progress of one of the two equal halves of the work; none if there is no callback.
 std::function<bool(float)> halfOf(const std::function<bool(float)>& progress, float begin) {
     if (!progress) return {};
     return [&progress, begin](float fraction) { return progress(begin + fraction / 2); };

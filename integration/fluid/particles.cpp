@@ -14,12 +14,13 @@
 #include <limits>
 #include <stdexcept>
 
-#include "collider/field/interpolant.h"
+#include "collider/field/layout/interpolant.h"
 #include "integration/fluid/detail/placement.h"
 #include "integration/fluid/detail/regrid.h"
 #include "sdf/base/hash.h"
 #include "sdf/base/openvdb_points.h"
 #include "sdf/base/progress.h"
+#include "sdf/leaf/blocks.h"
 
 namespace bilayer::fluid {
 
@@ -33,7 +34,6 @@ using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::Vec3d;
 
-constexpr int blockSide = 8;  // edge of a task's block: a leaf [voxels]
 constexpr int maxPerVoxel = 1000;
 constexpr double farOutside = 1;       // distance at a voxel's centre beyond which no part of it is inside [voxels]
 constexpr int jitterBits = 21;         // bits of a coordinate: three fit into one hash

@@ -59,19 +59,9 @@ Pose poseOf(const py::object& object, const char* name) {
     return poseOfMatrix(Floats(object, name, {4, 4}, Range::finite, Items::one), name);
 }
 
-void requirePositive(double value, const char* name) {
-    if (!(value > 0) || !std::isfinite(value))
-        throw std::invalid_argument(fmt::format("{} is {}, and must be above 0 and finite", name, value));
-}
-
 void requireVoxelSize(double value, const char* name) {
     requirePositive(value, name);
     bilayer::detail::checkVoxelSize(value, name);
-}
-
-void requireNotNegative(double value, const char* name) {
-    if (!(value >= 0) || !std::isfinite(value))
-        throw std::invalid_argument(fmt::format("{} is {}, and must be 0 or above, and finite", name, value));
 }
 
 Path pathOf(const py::object& object, const char* name) {

@@ -14,6 +14,7 @@
 
 #include <bilayer/collider/pose.h>
 #include <bilayer/sdf/mesh.h>
+#include "sdf/base/required_numbers.h"
 
 namespace bilayer::python {
 
@@ -51,14 +52,11 @@ Value byWord(const std::array<std::pair<const char*, Value>, count>& words, cons
     throw std::invalid_argument(std::string(name) + ": expected one of " + known + ", got '" + word + "'");
 }
 
-/// Throws std::invalid_argument that names the argument unless a number is above 0 and finite.
-void requirePositive(double value, const char* name);
+using bilayer::detail::requireNotNegative;
+using bilayer::detail::requirePositive;
 
 /// Throws std::invalid_argument that names the argument unless voxels may have this size.
 void requireVoxelSize(double value, const char* name);
-
-/// Throws std::invalid_argument that names the argument unless a number is 0 or above, and finite.
-void requireNotNegative(double value, const char* name);
 
 /// A path as Python's file functions accept it: str, bytes or os.PathLike.
 struct Path {

@@ -10,7 +10,7 @@
 
 #include <bilayer/collider/mass.h>
 
-#include "collider/contact/accuracy_names.h"
+#include "collider/contact/body/accuracy_names.h"
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"
@@ -46,11 +46,11 @@ py::object massOf(const py::object& solid) {
 }
 
 ColliderOptions optionsOf(float pointSpacing, std::optional<float> margin, const std::string& accuracy) {
-    requirePositive(double(pointSpacing), "point_spacing_voxels");
+    requirePositive(pointSpacing, "point_spacing_voxels");
     ColliderOptions options{.pointSpacingVoxels = pointSpacing,
                             .accuracy = byWord(bilayer::detail::accuracyNames, accuracy, "accuracy")};
     if (!margin) return options;
-    requireNotNegative(double(*margin), "margin");
+    requireNotNegative(*margin, "margin");
     options.margin = *margin;
     return options;
 }

@@ -36,7 +36,7 @@ py::object findContacts(const py::object& a, const py::object& poseA, const py::
                         float margin, bool exact, float scaleA, float scaleB, const py::object& motionA,
                         const py::object& motionB, float minNormalCosine, float minNormalCosineApart,
                         bool keepObliqueEdges, bool reduced, LockedCache* cache) {
-    requireNotNegative(double(margin), "margin");
+    requireNotNegative(margin, "margin");
     requireCosine(minNormalCosine, "min_normal_cosine");
     requireCosine(minNormalCosineApart, "min_normal_cosine_apart");
     const PlacedShape first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");

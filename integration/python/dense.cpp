@@ -186,7 +186,7 @@ Widths widthsOf(const py::object& halfWidth, float minAtBorder, float deepest, d
     if (widths.size() != 1 && given.shape() != Shape{2})
         throw std::invalid_argument("half_width: expected a number, or an exterior and an interior one, got shape " +
                                     text(given.shape()));
-    for (const float width : widths) requirePositive(double(width), "half_width");
+    for (const float width : widths) requirePositive(width, "half_width");
     if (double(widths[0]) > double(minAtBorder) + spacing)
         throw std::invalid_argument(
             fmt::format("half_width is {:g} outside, but a voxel at the border of the array is at {:g}: the band must "

@@ -67,7 +67,7 @@ py::object findImpact(const py::object& a, const py::object& poseA, const py::ob
                       const py::object& poseB, const py::object& motionB, float scaleA, float scaleB, float tolerance,
                       bool penetration) {
     const PlacedShape first = placed(a, poseA, scaleA, motionA, "a"), second = placed(b, poseB, scaleB, motionB, "b");
-    requireNotNegative(double(tolerance), "tolerance");
+    requireNotNegative(tolerance, "tolerance");
     if (penetration && tolerance > 0)
         throw std::invalid_argument(fmt::format("tolerance is {}, and must be 0 with penetration=True", tolerance));
     Impact impact;

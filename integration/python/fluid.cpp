@@ -40,7 +40,7 @@ fluid::Placement placementOf(const py::object& pose, const py::object& scale) {
         throw std::invalid_argument("scale: expected one number or three, got shape " + text(factors.shape()));
     factors.broadcast({3});
     const auto f = factors.as<float>();
-    for (const float factor : f) requirePositive(double(factor), "scale");
+    for (const float factor : f) requirePositive(factor, "scale");
     return {poseOf(pose, "pose"), glm::vec3(f[0], f[1], f[2])};
 }
 

@@ -17,7 +17,7 @@
 #include <bilayer/sdf/surface.h>
 #include <bilayer/sdf/vdb_io.h>
 
-#include "collider/contact/body.h"
+#include "collider/contact/body/body.h"
 #include "integration/python/arguments.h"
 #include "integration/python/arrays.h"
 #include "integration/python/bindings.h"

@@ -104,7 +104,7 @@ py::object toReport(const MeshReport& r) {
 }
 
 py::object inspectMesh(const SharedMesh& mesh, float wall) {
-    requireNotNegative(double(wall), "wall");
+    requireNotNegative(wall, "wall");
     return toReport(cancellable(
         py::none(), [&](const ProgressCallback& progressCallback) { return inspect(*mesh, wall, progressCallback); }));
 }

@@ -27,7 +27,7 @@ ContactShape shapeOf(const py::object& body, const char* name) {
 PlacedShape placed(const py::object& body, const py::object& pose, float scale, const py::object& motion,
                    const char* name) {
     const std::string suffix = std::string("_") + name;
-    requirePositive(double(scale), ("scale" + suffix).c_str());
+    requirePositive(scale, "scale" + suffix);
     return {shapeOf(body, name), poseOf(pose, ("pose" + suffix).c_str()), scale,
             motionOf(motion, ("motion" + suffix).c_str())};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How bounding boxes lie to each other. Boxes that only touch overlap.
+// Whether bounding boxes overlap or hold each other. Boxes that only touch count as overlapping.
 // Tested by tests/sdf/part_nesting.cpp through PartNesting.
 #pragma once
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reports the progress of a build, and stops the build when its listener requests cancellation.
+// Reports the progress of a build, and stops the build when the caller asks for that.
 #pragma once
 
 #include <algorithm>
@@ -14,17 +14,17 @@
 
 namespace bilayer::detail {
 
-/// Thread-safe. Only one thread at a time calls the listener.
+/// Thread-safe. Only one thread at a time calls the callback.
 class Progress {
   public:
     /// Short enough for a smooth progress bar and a prompt cancellation.
     static constexpr std::chrono::steady_clock::duration usualInterval = std::chrono::milliseconds(5);
 
-    /// @param listener  a reference is kept; a null function costs nothing
-    /// @param interval  min time between two calls of the listener
-    explicit Progress(const std::function<bool(float)>& listener,
+    /// @param callback  a reference is kept; a null function costs nothing
+    /// @param interval  min time between two calls of the callback
+    explicit Progress(const std::function<bool(float)>& callback,
                       std::chrono::steady_clock::duration interval = usualInterval)
-        : listener_(listener), interval_(interval) {}
+        : callback_(callback), interval_(interval) {}
 
     /// Sets the total that advance() counts towards.
     void begin(std::size_t total) {
@@ -38,10 +38,10 @@ class Progress {
         poll();
     }
 
-    /// Calls the listener if the interval since its last call has passed. Throws Cancelled. Call this every few
+    /// Calls the callback if the interval since its last call has passed. Throws Cancelled. Call this every few
     /// milliseconds.
     void poll() {
-        if (!listener_) return;
+        if (!callback_) return;
         if (cancelled_.load(std::memory_order_relaxed)) throw Cancelled();
         const auto now = std::chrono::steady_clock::now().time_since_epoch();
         if (now < next_.load(std::memory_order_relaxed)) return;
@@ -55,19 +55,19 @@ class Progress {
 
     /// Reports that everything is done.
     void finish() {
-        if (listener_) report(1);
+        if (callback_) report(1);
     }
 
   private:
     void report(float part) {
-        if (listener_(part)) return;
+        if (callback_(part)) return;
         cancelled_ = true;
         throw Cancelled();
     }
 
     /// The share of the progress that counted work takes. Joining blocks takes the rest and cannot be counted.
     static constexpr float workShare = 0.95f;
-    const std::function<bool(float)>& listener_;
+    const std::function<bool(float)>& callback_;
     const std::chrono::steady_clock::duration interval_;
     std::atomic<std::size_t> total_{0}, done_{0};
     float reported_ = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The memory that this process may use. Requests that cannot fit into it are rejected early.
-// Tested by tests/tools/limits.cpp through run().
+// Tested by tests/tools/limits.cpp through the program.
 #pragma once
 
 namespace bilayer::detail {

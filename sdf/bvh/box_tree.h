@@ -18,6 +18,10 @@ class Progress;
 
 inline constexpr int treeWidth = 8;  ///< triangles per leaf and boxes per group: one vector of floats
 
+/// Max nodes that a search keeps open, where opening a group adds at most seven: eleven levels of groups hold all nodes
+/// that 32 bits can number.
+inline constexpr std::size_t maxOpenNodes = (treeWidth - 1) * 11 + 1;
+
 /// The boxes of eight leaves or of eight groups. Unused boxes are empty, that is, infinitely far away.
 struct BoxGroup {
     alignas(64) float lower[3][treeWidth];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // SIMD narrowing of a list of nodes to those near a box of voxels. Highway includes this file once for each instruction
 // set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
-// Tested by tests/sdf/wide_tree.cpp through WideTree.
+// Tested by tests/sdf/wide_tree.cpp through collectNodes().
 #if defined(BILAYER_SDF_NODE_NARROWING_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_NODE_NARROWING_H
 #undef BILAYER_SDF_NODE_NARROWING_H

@@ -22,12 +22,9 @@ namespace bilayer::detail::HWY_NAMESPACE {
 
 // The nodes that are still to visit, each with a key. The last one is visited next.
 struct NodeStack {
-    // Eleven levels of groups hold all nodes that 32 bits can number. Opening a group adds at most seven nodes.
-    static constexpr std::size_t maxLevels = 11, capacity = (treeWidth - 1) * maxLevels + 1;
-
     std::size_t count = 0;
-    float keys[capacity];
-    std::uint32_t nodes[capacity];
+    float keys[maxOpenNodes];
+    std::uint32_t nodes[maxOpenNodes];
 
     void push(float key, std::uint32_t node) { keys[count] = key, nodes[count++] = node; }
 

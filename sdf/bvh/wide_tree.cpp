@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sdf/base/perpendicular.h"
 #include "sdf/base/polled_loop.h"
 #include "sdf/base/triangle_corners.h"
 
@@ -159,13 +160,6 @@ void split(const TriangleParts& parts, std::vector<std::uint64_t>& keys, Progres
     });
     sortBySplitting(items, progress);
     forAllPolled(keys.size(), progress, [&](std::size_t i) { keys[i] = items[i].index; });
-}
-
-// Returns a unit vector perpendicular to `direction`.
-glm::dvec3 perpendicularTo(const glm::dvec3& direction) {
-    const glm::dvec3 a = glm::abs(direction);
-    const glm::dvec3 smallest(a.x <= a.y && a.x <= a.z, a.y < a.x && a.y <= a.z, a.z < a.x && a.z < a.y);
-    return glm::normalize(glm::cross(direction, smallest));
 }
 
 template <class Vector>

@@ -239,7 +239,7 @@ void LayerSamples::begin(const SampledBrick& brick) {
     cells_.lower = glm::vec3(-brick.reach);
     cells_.upper = glm::vec3(float(brick.side - 1) + brick.reach);
     // A cell begins half a voxel before its voxels. One tenth of a voxel is a margin for rounding.
-    cells_.around = 1 + int(std::floor((brick.reach - 0.4f) / float(cellSide)));
+    cells_.around = cellsAround(brick.reach);
     cells_.firstCorner = -0.5f - float(cells_.around * cellSide);
     cells_.size = brick.side / cellSide + 2 * cells_.around;
     added_.count = 0;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <glm/common.hpp>
@@ -62,6 +63,9 @@ class LayerSamples {
   public:
     /// Side of a cell [voxels]. Cell (0, 0, 0) covers the first voxels of the brick and half a voxel around them.
     static constexpr int cellSide = 4;
+
+    /// Returns the count of cells around a brick, on each side, that hold samples within reach [voxels].
+    static int cellsAround(float reach) { return 1 + int(std::floor((reach - 0.4f) / float(cellSide))); }
 
     /// Returns the lattice point nearest to a position. Halves round up, independent of rounding errors.
     static glm::vec3 nearestLattice(const glm::vec3& place) { return glm::floor(place + 0.5001f); }

@@ -47,8 +47,8 @@ class Assembler {
     /// from all threads.
     void copy(const Grids& from, const std::function<bool(const openvdb::Coord&)>& keep);
 
-    /// Builds the level set of all blocks, with signs in the space between them. Call it once, after the last block.
-    /// A part keeps blocks that have no voxel in the band, which the whole field needs for its signs. Throws Cancelled.
+    /// Builds the level set of all blocks, with signs in the space between them. Call it once, after the last block. A
+    /// part keeps its blocks without a voxel in the band: the merged field finds signs from them. Throws Cancelled.
     openvdb::FloatGrid::Ptr distances();
     /// The same for grids read from files, with their background values outside and inside as they are stored [m].
     openvdb::FloatGrid::Ptr distances(float exterior, float interior);

@@ -13,7 +13,7 @@
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/openvdb.h"
 #include "sdf/base/quoted_text.h"
-#include "sdf/io/vdb_archive.h"
+#include "sdf/io/vdb/vdb_archive.h"
 
 namespace bilayer::detail {
 namespace {

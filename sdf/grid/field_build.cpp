@@ -84,7 +84,7 @@ FilledPart buildPart(const Mesh& mesh, const BuildOptions& options, const FieldP
             field.fillWithOwnSigns();
         else
             field.fill(mesh, part.signs.method, part.signs.reason, options.method);
-        return FilledPart{field.grids(), field.signs().conflicts, field.compared(), field.faces(), field.border()};
+        return field.part();
     });
 }
 

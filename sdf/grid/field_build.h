@@ -25,18 +25,9 @@ LevelSet buildField(const Mesh& mesh, const BuildOptions& options, const DeviceF
 LevelSet rebuildField(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh,
                       std::span<const std::uint32_t> moved, const BuildOptions& options);
 
-/// The outcome of buildPart().
-struct FilledPart {
-    std::shared_ptr<Grids> grids;  ///< possibly without any leaf
-    std::size_t conflicts = 0;     ///< with a conflict, the signs are not those of the whole field
-    ComparedSigns compared{};      ///< if the part checks its normals
-    FaceSides faces{};
-    openvdb::FloatTree::Ptr border;  ///< borderOf()
-};
-
 /// Builds a part of a field from the triangles near it.
-/// @param options  for which triangles near a block determine its distances: Method::doubleLayer, or Method::exact,
-///                 whose signs are those of the part
+/// @param options  by Method::doubleLayer or Method::exact, where the triangles near a block determine its distances.
+///                 `part.signs` says how `exact` finds signs
 /// Throws as build() does, and std::invalid_argument where only the whole mesh can decide a sign.
 FilledPart buildPart(const Mesh& mesh, const BuildOptions& options, const FieldPart& part);
 

@@ -48,13 +48,6 @@ Assembler::Plain plainBlocks(const BuildOptions& options, Sign sign) {
     return sign == Sign::normals && enclosesSurface(options) ? Assembler::Plain::drop : Assembler::Plain::keep;
 }
 
-// Lets a job fill a part of the field only.
-void restrict(MeshJob& job, const FieldPart* part) {
-    if (!part) return;
-    job.isPart = true;
-    job.wanted = [box = part->filled()](const glm::ivec3& first, int side) { return box.overlaps(first, side); };
-}
-
 void makePositive(openvdb::FloatGrid& distance) {
     openvdb::tree::LeafManager<openvdb::FloatTree> leaves(distance.tree());
     leaves.foreach ([](auto& leaf, std::size_t) {
@@ -99,30 +92,22 @@ void FieldFiller::fillWithOwnSigns() {
     Stopwatch watch;
     const bool prism = options_.method == Method::prism;
     if (prism)
-        signs_ = {prismSigns, "the side of the nearest triangle whose prism holds the voxel"};
+        field_.signs = {prismSigns, "the side of the nearest triangle whose prism holds the voxel"};
     else
-        signs_ = {layerSigns, "the nearer of two layers decides the side"};
+        field_.signs = {layerSigns, "the nearer of two layers decides the side"};
     FillParameters parameters = fillParameters(options_);
     if (prism) parameters.reach = reachOf(options_, Sign::normals);
     Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_, part_);
-    std::atomic<std::size_t> undecided = 0;
-    MeshJob job{.mesh = mesh_,
-                .voxelSize = options_.voxelSize,
-                .reach = parameters.reach,
-                .triangles = options_.triangles,
-                .sign = true,
-                .sink = [&](const FilledBlocks& blocks) { take(assembler, blocks); },
-                .progress = progress_,
-                .undecided = &undecided};
-    restrict(job, part_);
+    Counts counts;
+    const MeshJob job = jobFor(mesh_, parameters.reach, true, assembler, counts);
     if (device_)
         device_->fill({job, options_, extent_.box, parameters});
     else
         fillDoubleLayer(job, extent_.box, options_.doubleLayer, parameters);
     times_.fill += watch.lap();
-    signs_.undecided = undecided;
-    finish(assembler);
-    trim();
+    field_.signs.undecided = counts.undecided;
+    field_.join(assembler, options_.voxelSize);
+    if (part_) field_.trim(*part_);
     times_.assemble += watch.lap();
 }
 
@@ -153,17 +138,8 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     const BandWidths widths = bandOf(options_);
     Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
                         plainBlocks(options_, sign), progress_, part_);
-    std::atomic<std::size_t> undecided = 0, conflicts = 0;
-    MeshJob job{.mesh = mesh,
-                .voxelSize = options_.voxelSize,
-                .reach = reach,
-                .triangles = options_.triangles,
-                .sign = byNormals,
-                .sink = [&](const FilledBlocks& blocks) { take(assembler, blocks); },
-                .progress = progress_,
-                .undecided = &undecided,
-                .conflicts = &conflicts};
-    restrict(job, part_);
+    Counts counts;
+    MeshJob job = jobFor(mesh, reach, byNormals, assembler, counts);
     if (adapt) adapt(job, assembler);
     // Flipping triangles does not change the bounding box.
     if (device_)
@@ -173,29 +149,46 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     else
         fillPseudonormal(job);
     times_.fill += watch.lap();
-    finish(assembler);
+    field_.join(assembler, options_.voxelSize);
     progress_.poll();
     if (sign == Sign::winding && part_)
-        signPartByWinding(*distance_, mesh, widths, *part_, enclosesSurface(options_), progress_);
+        signPartByWinding(*field_.distance, mesh, widths, *part_, enclosesSurface(options_), progress_);
     else if (sign == Sign::winding)
-        signByWinding(*distance_, solids, widths, balanced(solids, &progress_), &progress_);
-    if (sign == Sign::flood && !part_) signByFlood(*distance_, mesh, options_.gapVoxels, widths, &progress_);
-    if (byNormals) conflicts += assembler.conflicts(*distance_);
-    signs_ = {nameOf(sign), reason, conflicts, undecided};
+        signByWinding(*field_.distance, solids, widths, balanced(solids, &progress_), &progress_);
+    if (sign == Sign::flood && !part_) signByFlood(*field_.distance, mesh, options_.gapVoxels, widths, &progress_);
+    if (byNormals) counts.conflicts += assembler.conflicts(*field_.distance);
+    field_.signs = {nameOf(sign), reason, counts.conflicts, counts.undecided};
     if (byNormals && part_ && part_->signs.check != NormalsCheck::none)
-        compared_ = comparePart(*distance_, mesh, *part_, repairLimit(options_), progress_);
-    if (part_ && !part_->signs.name.empty()) signs_.name = part_->signs.name;
+        field_.part.compared = comparePart(*field_.distance, mesh, *part_, repairLimit(options_), progress_);
+    if (part_ && !part_->signs.name.empty()) field_.signs.name = part_->signs.name;
     const bool isKnownToBeClean = options_.inspected && options_.inspected->selfIntersections == 0;
-    if (byNormals && !part_ && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean)
-        repair(*distance_, mesh, options_, progress_, signs_);
-    trim();
+    if (byNormals && !part_ && options_.sign == Sign::automatic && field_.signs.conflicts == 0 && !isKnownToBeClean)
+        repair(*field_.distance, mesh, options_, progress_, field_.signs);
+    if (part_) field_.trim(*part_);
     times_.assemble += watch.lap();
+}
+
+// A job that fills the part, or the whole field, into an assembler.
+MeshJob FieldFiller::jobFor(const Mesh& mesh, float reach, bool sign, Assembler& assembler, Counts& counts) {
+    MeshJob job{.mesh = mesh,
+                .voxelSize = options_.voxelSize,
+                .reach = reach,
+                .triangles = options_.triangles,
+                .sign = sign,
+                .sink = [this, &assembler](const FilledBlocks& blocks) { take(assembler, blocks); },
+                .progress = progress_,
+                .undecided = &counts.undecided,
+                .conflicts = &counts.conflicts};
+    if (!part_) return job;
+    job.isPart = true;
+    job.wanted = [box = part_->filled()](const glm::ivec3& first, int side) { return box.overlaps(first, side); };
+    return job;
 }
 
 // A second field of the mesh gives the signs: the one that was filled last.
 void FieldFiller::fillWithSidesOfLast(const Mesh& mesh, const std::string& reason) {
-    const openvdb::FloatGrid::ConstPtr sides = distance_;
-    const FieldSigns signs = signs_;
+    const openvdb::FloatGrid::ConstPtr sides = field_.distance;
+    const FieldSigns signs = field_.signs;
     fillFrom(mesh, mesh, Sign::normals, reason, options_.method, [&](MeshJob& job, Assembler& assembler) {
         job.sign = false;
         job.sink = [this, &sides, &assembler](const FilledBlocks& blocks) {
@@ -203,7 +196,7 @@ void FieldFiller::fillWithSidesOfLast(const Mesh& mesh, const std::string& reaso
             take(assembler, {blocks.origins, distances, blocks.triangles});
         };
     });
-    signs_ = signs;
+    field_.signs = signs;
 }
 
 // With equal widths on both sides, the active voxels do not depend on the signs. The sides of a closed mesh follow from
@@ -214,9 +207,9 @@ bool FieldFiller::signAgainByWinding(const Mesh& mesh, const std::string& reason
     const bool isComplete =
         filledBlocks_ > 0 && enclosesSurface(options_) && widths.exterior == widths.interior && !part_;
     if (!isComplete || options_.unite || !balanced(mesh, &progress_)) return false;
-    makePositive(*distance_);
-    signByWinding(*distance_, mesh, widths, true, &progress_);
-    signs_ = {nameOf(Sign::winding), reason, 0, 0};
+    makePositive(*field_.distance);
+    signByWinding(*field_.distance, mesh, widths, true, &progress_);
+    field_.signs = {nameOf(Sign::winding), reason, 0, 0};
     times_.assemble += watch.lap();
     return true;
 }
@@ -226,36 +219,23 @@ void FieldFiller::take(Assembler& assembler, const FilledBlocks& blocks) {
     assembler.take(blocks);
 }
 
-void FieldFiller::finish(Assembler& assembler) {
-    distance_ = assembler.distances();
-    distance_->setTransform(openvdb::math::Transform::createLinearTransform(options_.voxelSize));
-    triangle_ = assembler.triangles();
-}
-
-void FieldFiller::trim() {
-    if (!part_) return;
-    faces_ = faceSides(distance_->tree(), *part_);
-    border_ = borderOf(distance_->tree(), *part_);
-    trimToPart(distance_->tree(), *part_);
-    if (triangle_) renumber(triangle_->tree(), *part_);
-}
-
 LevelSet FieldFiller::levelSet() {
-    if (distance_->empty() || distance_->activeVoxelCount() == 0) throw std::invalid_argument(noVoxelInBand(options_));
+    if (field_.distance->empty() || field_.distance->activeVoxelCount() == 0)
+        throw std::invalid_argument(noVoxelInBand(options_));
     progress_.poll();
     return LevelSet(grids());
 }
 
+FilledPart FieldFiller::part() {
+    FilledPart filled = field_.part;
+    filled.grids = grids();
+    filled.conflicts = field_.signs.conflicts;
+    return filled;
+}
+
 std::shared_ptr<Grids> FieldFiller::grids() {
     Stopwatch watch;
-    describe(*distance_, mesh_.origin, part_ ? part_->meshHash : hash(mesh_), options_, signs_);
-    auto grids = std::make_shared<Grids>();
-    grids->distance = distance_;
-    if (triangle_) {
-        keepActive(triangle_->tree(), distance_->tree());
-        triangle_->setTransform(distance_->transformPtr());
-        grids->triangle = triangle_;
-    }
+    const std::shared_ptr<Grids> grids = field_.finish(mesh_, part_ ? part_->meshHash : hash(mesh_), options_);
     progress_.finish();
     times_.assemble += watch.lap();
     times_.total = total_.lap();

@@ -19,6 +19,7 @@
 #include "sdf/grid/assemble.h"
 #include "sdf/grid/field_metadata.h"
 #include "sdf/grid/field_part.h"
+#include "sdf/grid/filled_field.h"
 #include "sdf/leaf/blocks.h"
 #include "sdf/leaf/build_size.h"
 
@@ -62,26 +63,25 @@ class FieldFiller {
     /// Returns the grids of the last field, which may be empty, with their metadata.
     std::shared_ptr<Grids> grids();
 
-    /// Returns on which sides the outermost voxels of the part lie.
-    const FaceSides& faces() const { return faces_; }
-    /// Returns how the normals of the part compare with winding numbers, if it checks them.
-    const ComparedSigns& compared() const { return compared_; }
-    /// Returns borderOf() the part.
-    const openvdb::FloatTree::Ptr& border() const { return border_; }
+    /// Returns the grids of the last field of a part, with what its neighbours need.
+    FilledPart part();
 
     const Mesh& mesh() const { return mesh_; }
     const BuildOptions& options() const { return options_; }
     const Bounds& box() const { return extent_.box; }
     /// The signs of the last field.
-    const FieldSigns& signs() const { return signs_; }
+    const FieldSigns& signs() const { return field_.signs; }
     BuildTimes& times() { return times_; }
     Progress& progress() { return progress_; }
 
   private:
+    struct Counts {
+        std::atomic<std::size_t> undecided = 0, conflicts = 0;
+    };
+
     bool fillUnion(const Mesh& mesh);
+    MeshJob jobFor(const Mesh& mesh, float reach, bool sign, Assembler& assembler, Counts& counts);
     void take(Assembler& assembler, const FilledBlocks& blocks);  // thread-safe
-    void finish(Assembler& assembler);
-    void trim();  // to the part
 
     const Mesh& mesh_;
     const BuildOptions& options_;
@@ -91,13 +91,8 @@ class FieldFiller {
     Stopwatch total_;
     Progress progress_;
     MeshExtent extent_;
-    FieldSigns signs_;
-    FaceSides faces_{};
-    ComparedSigns compared_;
-    openvdb::FloatTree::Ptr border_;
+    FilledField field_;  // the last one
     std::atomic<std::size_t> filledBlocks_ = 0;
-    openvdb::FloatGrid::Ptr distance_;
-    openvdb::Int32Grid::Ptr triangle_;
 };
 
 }  // namespace bilayer::detail

@@ -5,7 +5,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -16,6 +18,12 @@
 #include "sdf/sign/column_sums.h"
 #include "sdf/sign/sign_choice.h"
 #include "sdf/sign/sign_repair.h"
+
+namespace bilayer {
+
+struct Grids;
+
+}  // namespace bilayer
 
 namespace bilayer::detail {
 
@@ -60,6 +68,15 @@ struct VoxelSides {
 };
 /// On the faces of a box: lower x, y, z, then upper x, y, z.
 using FaceSides = std::array<VoxelSides, 6>;
+
+/// A part of a field when it is filled.
+struct FilledPart {
+    std::shared_ptr<Grids> grids;    ///< possibly without any leaf
+    std::size_t conflicts = 0;       ///< with a conflict, the signs are not those of the whole field
+    ComparedSigns compared{};        ///< if the part checks its normals
+    FaceSides faces{};               ///< faceSides()
+    openvdb::FloatTree::Ptr border;  ///< borderOf()
+};
 
 /// Gives the space between the leaves of a part its sign, as far as the part fills. Any leaf determines the sign of all
 /// space that is connected to it, and in a box each such space is connected to some leaf, if there is one.

@@ -15,9 +15,9 @@
 #include "sdf/base/quoted_text.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/mapped_file.h"
-#include "sdf/io/vdb_archive.h"
-#include "sdf/io/vdb_checksum.h"
-#include "sdf/io/vdb_lengths.h"
+#include "sdf/io/vdb/vdb_archive.h"
+#include "sdf/io/vdb/vdb_checksum.h"
+#include "sdf/io/vdb/vdb_lengths.h"
 
 namespace bilayer::detail {
 namespace {

@@ -11,6 +11,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <exception>
+#include <fstream>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -125,6 +128,21 @@ void AtomicFile::commit() {
     }
     entry_->release();
     entry_ = nullptr;
+}
+
+void writeWhole(const std::filesystem::path& target, const std::function<void(std::ostream&)>& write) {
+    AtomicFile file(target);
+    try {
+        std::ofstream stream(file.temporary(), std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        write(stream);
+        stream.close();
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception&) {
+        throw std::runtime_error(target.string() + ": cannot be written (is the disk full?)");
+    }
+    file.commit();
 }
 
 // Runs as a signal handler, so it may only use atomics, unlink(), signal() and raise().

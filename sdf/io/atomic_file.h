@@ -4,6 +4,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <iosfwd>
 
 namespace bilayer::detail {
 
@@ -34,6 +36,10 @@ class AtomicFile {
     std::filesystem::path target_, temporary_;
     Entry* entry_ = nullptr;
 };
+
+/// Writes a file whole or not at all, as AtomicFile does. The stream throws where it fails. Throws std::runtime_error
+/// that names `target` where the stream or `write` throws, other than std::bad_alloc.
+void writeWhole(const std::filesystem::path& target, const std::function<void(std::ostream&)>& write);
 
 /// For programs that write a file as their last action. After this call, SIGINT, SIGTERM and SIGHUP remove the
 /// temporary files of this process before they end it, unless they are ignored. The first signal after all files were

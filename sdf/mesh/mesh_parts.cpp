@@ -158,7 +158,7 @@ std::vector<unsigned> MeshParts::containersOf(unsigned inner, const TriangleTree
     return containers;
 }
 
-bool MeshParts::touch(unsigned a, unsigned b) const {
+bool MeshParts::intersect(unsigned a, unsigned b) const {
     if (members(a).size() > members(b).size()) std::swap(a, b);
     if (!overlap(box(a), box(b))) return false;
     const TriangleTree& tree = treeOf(b);

@@ -41,7 +41,7 @@ class MeshParts {
     /// Returns all parts that contain a part, in order, from the hierarchy over the whole mesh.
     std::vector<unsigned> containersOf(unsigned inner, const TriangleTree& tree) const;
     /// Returns whether some triangles of two parts have a point in common, up to rounding.
-    bool touch(unsigned a, unsigned b) const;
+    bool intersect(unsigned a, unsigned b) const;
 
   private:
     /// Count of lines that vote on whether a part lies within another: odd, and more than one in case a line hits an

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Let a part lie within a part D that separates its inside from its outside. Another part X that also separates, and
-// that does not touch D, lies inside of D or outside of it as a whole. If X contains the part, then X lies inside of D,
-// and is smaller, or contains D. If X contains D, it contains the part. So only parts smaller than D, those that touch
-// D, and those that do not separate need to be tested; the rest follows from D.
+// Which parts contain a part P follows in most cases from those that contain a part D around it. Let D contain P, and
+// let D separate its inside from its outside. Take a third part X that separates as well and does not touch D. As a
+// whole, X lies either inside of D or outside.
+// - If X is larger than D, it contains P exactly if it contains D.
+// - If X is smaller, it has to be tested.
+// So the parts to test are those smaller than D, those that touch D, and those that do not separate.
 //
-// Let D lie in a part Q that it does not touch. A part X that touches D and is larger than Q must touch Q. So the parts
-// that touch D are among those between D and Q in size, and those that touch Q.
+// The parts that touch D are found in the same way. Let D lie in a part Q that it does not touch. A part that touches D
+// and is larger than Q must touch Q. So the parts that touch D are between D and Q in size, or touch Q.
 #include "sdf/mesh/part_nesting.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -114,7 +116,7 @@ void PartNesting::findAll(unsigned part, const TriangleTree& tree, Containers& c
 unsigned PartNesting::clearContainer(unsigned part, std::vector<unsigned>& touching) const {
     unsigned outer = containers_[part].innermost;
     for (; outer != noPart && touching.size() <= maxTests; outer = containers_[outer].innermost) {
-        if (parts_.touch(part, outer))
+        if (parts_.intersect(part, outer))
             touching.push_back(outer);
         else if (heritage_[outer].isInherited)
             break;
@@ -130,7 +132,7 @@ bool PartNesting::findTouching(unsigned part, std::vector<unsigned>& touching) c
     const auto test = [&](unsigned other) {
         if (std::find(climbed.begin(), climbed.end(), other) != climbed.end()) return true;
         if (++tests > maxTests) return false;
-        if (parts_.touch(part, other)) touching.push_back(other);
+        if (parts_.intersect(part, other)) touching.push_back(other);
         return true;
     };
     if (tests > maxTests) return false;

@@ -125,7 +125,7 @@ class ColumnNumbers {
         return crossed;
     }
 
-    /// Returns a column's number below the leaf; in all of it, if the column is not crossed.
+    /// Returns the winding number of a column below the leaf. A column that is not crossed has it in the whole leaf.
     std::int32_t below(std::size_t column) const { return winding_[column]; }
 
     /// Advances a column to the leaf's top, and calls visit(k, number) for each of its voxels. Call it once for each

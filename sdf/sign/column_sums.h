@@ -11,8 +11,8 @@
 
 namespace bilayer::detail {
 
-/// One sum per column of a rectangle, zero at first. A solid that begins counts +1, one that ends counts -1. The sum of
-/// all crossings below a voxel is its winding number, exactly, if the mesh is closed.
+/// One sum per column of a rectangle, zero at first. A crossing into a solid counts +1, one out of it -1. For a closed
+/// mesh, the sum of all crossings below a voxel is exactly its winding number.
 class ColumnSums {
   public:
     /// @param first, end  columns, `end` without them [voxels]

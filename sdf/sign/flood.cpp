@@ -24,10 +24,11 @@ constexpr std::uint32_t infinity = 0;  // the part that contains all space beyon
 /// Finds the sides of all voxels in leaves, and of the cells between leaves.
 class Flood {
   public:
-    Flood(const OctreeCells& cells, const Mesh& mesh, float gap, float background, float voxelSize, Progress* progress)
+    Flood(const OctreeCells& cells, const Mesh& mesh, float gapVoxels, float background, float voxelSize,
+          Progress* progress)
         : cells_(cells),
           mesh_(mesh),
-          free_(freeDistance(gap, voxelSize)),
+          free_(freeDistance(gapVoxels, voxelSize)),
           background_(background),
           voxelSize_(voxelSize),
           progress_(progress),
@@ -166,18 +167,19 @@ void Flood::findNeighbours() {
 
 }  // namespace
 
-void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths, Progress* progress) {
-    const float reach = 0.5f * gap + 1;
-    if (!(gap >= 0)) throw std::invalid_argument(fmt::format("gapVoxels must be at least 0, not {}", gap));
+void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gapVoxels, const BandWidths& widths,
+                 Progress* progress) {
+    const float reach = 0.5f * gapVoxels + 1;
+    if (!(gapVoxels >= 0)) throw std::invalid_argument(fmt::format("gapVoxels must be at least 0, not {}", gapVoxels));
     if (grid.background() < (reach - distanceSlack) * widths.voxelSize)
-        throw std::invalid_argument(fmt::format("gapVoxels {} needs distances up to {} voxels", gap, reach));
+        throw std::invalid_argument(fmt::format("gapVoxels {} needs distances up to {} voxels", gapVoxels, reach));
     validate(mesh);
     const float background = grid.background();
     const std::vector<BandLeaf*> leaves = leavesOf(grid);
     std::vector<openvdb::CoordBBox> inside;
     if (!leaves.empty()) {
         const OctreeCells cells(leaves, {}, progress);
-        Flood flood(cells, mesh, gap, background, widths.voxelSize, progress);
+        Flood flood(cells, mesh, gapVoxels, background, widths.voxelSize, progress);
         flood.run();
         tbb::parallel_for(std::size_t(0), cells.all().size(), [&](std::size_t c) {
             if (BandLeaf* leaf = cells.all()[c].leaf) signLeaf(*leaf, flood.inside(c), widths);

@@ -33,8 +33,8 @@ void record(FloodLeaf& leaf, std::uint32_t number, std::uint32_t step) {
 
 }  // namespace
 
-float freeDistance(float gap, float voxelSize) {
-    return (0.5f * gap + 0.5f + distanceSlack) * voxelSize;
+float freeDistance(float gapVoxels, float voxelSize) {
+    return (0.5f * gapVoxels + 0.5f + distanceSlack) * voxelSize;
 }
 
 std::vector<BlockMask> freeParts(const float* distances, float free) {

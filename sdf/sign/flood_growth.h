@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Carries the sides of a flood from the voxels where its ball fits to those nearer to the surface, in steps over all
+// Propagates the sides of a flood from the voxels where its ball fits to those nearer to the surface, in steps over all
 // leaves. The leaves may be those of a whole field, or those of a tile with leaves of its neighbours around them.
 // Tested by tests/sdf/flood.cpp through signByFlood().
 #pragma once
@@ -43,9 +43,9 @@ struct FloodLeaf {
     BlockMask outsideNext{}, insideNext{};
 };
 
-/// Returns the distance that voxels must have for a ball of diameter `gap` voxels to fit: links between two such voxels
-/// keep gap / 2 from the surface along their whole length [m].
-float freeDistance(float gap, float voxelSize);
+/// Returns the distance that voxels must have for a ball of diameter `gapVoxels` to fit: links between two such voxels
+/// keep gapVoxels / 2 from the surface along their whole length [m].
+float freeDistance(float gapVoxels, float voxelSize);
 
 /// Returns the connected sets of the voxels of a leaf whose distance exceeds `free`.
 std::vector<BlockMask> freeParts(const float* distances, float free);

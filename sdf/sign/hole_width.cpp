@@ -5,8 +5,6 @@
 // because the winding number is harmonic there.
 #include "sdf/sign/hole_width.h"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,6 +14,7 @@
 #include <queue>
 #include <vector>
 
+#include "sdf/base/divided_cubes.h"
 #include "sdf/base/progress.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/bvh/winding_number.h"
@@ -29,8 +28,6 @@ namespace {
 constexpr double tolerance = 0.05;
 /// Error of winding numbers, as a fraction of their distance to one half.
 constexpr double share = 0.1;
-/// Count of cubes that are divided at once.
-constexpr std::size_t batchSize = 64;
 const double halfDiagonal = std::sqrt(3.0);  // of a cube, in units of half its side
 
 struct Cube {
@@ -61,12 +58,9 @@ class Search {
         while (!cubes.empty()) {
             if (const Cube& widest = cubes.top(); isSmall(widest)) return {2 * widest.maxDistance(), widest.centre};
             std::vector<Cube> batch;
-            for (; batch.size() < batchSize && !cubes.empty() && !isSmall(cubes.top()); cubes.pop())
+            for (; batch.size() < cubesAtOnce && !cubes.empty() && !isSmall(cubes.top()); cubes.pop())
                 batch.push_back(cubes.top());
-            std::vector<std::vector<Cube>> parts(batch.size());
-            tbb::parallel_for(std::size_t(0), batch.size(), [&](std::size_t i) { parts[i] = divided(batch[i]); });
-            for (const std::vector<Cube>& some : parts)
-                for (const Cube& cube : some) cubes.push(cube);
+            for (const Cube& part : divided(batch, [&](const Cube& cube) { return octantsOf(cube); })) cubes.push(part);
         }
         return {};
     }
@@ -84,7 +78,7 @@ class Search {
     static bool isSmall(const Cube& cube) { return cube.half <= tolerance * cube.distance; }
 
     /// Returns the octants that may contain a sufficiently wide hole.
-    std::vector<Cube> divided(const Cube& cube) const {
+    std::vector<Cube> octantsOf(const Cube& cube) const {
         poll(progress_);
         std::vector<Cube> parts;
         for (int octant = 0; octant < 8; ++octant) {

@@ -27,8 +27,8 @@ struct WindingQuery {
     double voxelSize;
     Progress* progress;  ///< polled by each query, unless null
 
-    /// Returns the side of a point [m]. If the number changes only across the surface, its margin is infinite: the side
-    /// is valid up to the surface.
+    /// Returns the side of a point [m]. The margin is infinite if the winding number changes only across the surface:
+    /// the side then holds for all points that a path reaches without crossing it.
     WindingSide at(const glm::dvec3& point) const;
 
     /// Returns the side of the space around a point, which is away from the surface [m].

@@ -23,8 +23,8 @@ class WindingSlope {
     /// @param progress  polled, unless null
     explicit WindingSlope(const Mesh& mesh, Progress* progress = nullptr);
 
-    /// Returns an upper bound on the gradient's magnitude in a ball [1/m]. Links in the ball must not cross the
-    /// surface.
+    /// Returns an upper bound on the gradient's magnitude in a ball [1/m]. No line in the ball may cross
+    /// the surface.
     double operator()(const glm::dvec3& centre, double radius) const;
 
   private:

@@ -13,14 +13,11 @@
 namespace bilayer::detail {
 
 void HashedRecordWriter::write(const std::filesystem::path& path) const {
-    AtomicFile file(path);
     const std::uint64_t hash = contentHash(bytes_);
-    std::ofstream stream(file.temporary(), std::ios::binary | std::ios::trunc);
-    stream.write(bytes_.data(), std::streamsize(bytes_.size()));
-    stream.write(reinterpret_cast<const char*>(&hash), sizeof hash);
-    stream.close();
-    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-    file.commit();
+    writeWhole(path, [&](std::ostream& stream) {
+        stream.write(bytes_.data(), std::streamsize(bytes_.size()));
+        stream.write(reinterpret_cast<const char*>(&hash), sizeof hash);
+    });
 }
 
 HashedRecordReader::HashedRecordReader(const std::filesystem::path& path) : path_(path) {

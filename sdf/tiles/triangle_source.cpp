@@ -15,12 +15,12 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/io/formats/ply_fixed_records.h"
+#include "sdf/io/formats/ply_header.h"
+#include "sdf/io/formats/stl_records.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/mapped_file.h"
-#include "sdf/io/ply_fixed_records.h"
-#include "sdf/io/ply_header.h"
-#include "sdf/io/polygons.h"
-#include "sdf/io/stl_records.h"
+#include "sdf/io/polygon/polygons.h"
 #include "sdf/io/text_source.h"
 #include "sdf/mesh/topology.h"
 #include "sdf/sign/sign_choice.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bodies from files in a world.
-#include "collider/contact/body.h"
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/body.h"
+#include "collider/contact/body/collider_data.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -12,8 +12,8 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
+#include "tests/bullet/world.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::body_test {
 using namespace bilayer::detail;

@@ -12,10 +12,10 @@
 #include <bilayer/integration/bullet/extensions.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/world.h"
 #include "tests/support/drops.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::body_sweep_test {
 using namespace bilayer::test;

@@ -11,12 +11,12 @@
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/vdb_io.h>
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
-#include "field_and_mesh.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/field_and_mesh.h"
+#include "tests/bullet/world.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::casts_test {
 using namespace bilayer::detail;

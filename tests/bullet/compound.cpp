@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "world.h"
+#include "tests/bullet/world.h"
 
 namespace bilayer::compound_test {
 using namespace bilayer::test;

@@ -11,9 +11,9 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::continuous_collision_test {
 using namespace bilayer::detail;
@@ -39,11 +39,11 @@ double energyOf(const btRigidBody& body, bool atLeast) {
 }
 
 /// A plate of two triangles.
-struct Sheet {
+struct SquarePlate {
     btTriangleMesh triangles;
     std::unique_ptr<btBvhTriangleMeshShape> shape;
 
-    explicit Sheet(float half) {
+    explicit SquarePlate(float half) {
         const btVector3 a(-half, -half, 0), b(half, -half, 0), c(half, half, 0), d(-half, half, 0);
         triangles.addTriangle(a, b, c);
         triangles.addTriangle(a, c, d);
@@ -67,15 +67,15 @@ TEST_CASE("No body passes through a thin plate or gains energy, at any speed and
     btCylinderShape cylinder({0.15f, 0.1f, 0.15f});
     btBoxShape box({0.2f, 0.1f, 0.15f}), plateBox({half, half, 0.5f * thickness * h});
     btStaticPlaneShape ground({0, 0, 1}, 0);
-    Sheet sheet(half);
+    SquarePlate quad(half);
     const struct {
         const char* name;
         btCollisionShape &moving, &still;
     } cases[] = {
-        {"ball, plate", ball, plate},     {"brick, plate", brick, plate},      {"ring, plate", ring, plate},
-        {"sphere, plate", sphere, plate}, {"capsule, plate", capsule, plate},  {"cylinder, plate", cylinder, plate},
-        {"box, plate", box, plate},       {"ball, plane", ball, ground},       {"brick, plane", brick, ground},
-        {"brick, box", brick, plateBox},  {"ball, sheet", ball, *sheet.shape}, {"brick, sheet", brick, *sheet.shape},
+        {"ball, plate", ball, plate},     {"brick, plate", brick, plate},     {"ring, plate", ring, plate},
+        {"sphere, plate", sphere, plate}, {"capsule, plate", capsule, plate}, {"cylinder, plate", cylinder, plate},
+        {"box, plate", box, plate},       {"ball, plane", ball, ground},      {"brick, plane", brick, ground},
+        {"brick, box", brick, plateBox},  {"ball, quad", ball, *quad.shape},  {"brick, quad", brick, *quad.shape},
         {"ring, box", ring, plateBox}};
     for (const auto& one : cases)
         for (float speed = 1; speed <= 1000; speed *= 10)
@@ -309,12 +309,12 @@ TEST_CASE("A body that hits hard does not penetrate by the speed that the solver
     Shape cube(exactBox({half, half, half}, voxel)), slab(exactBox({1.5f, 1.5f, 0.1f}, 4 * voxel));
     btStaticPlaneShape plane({0, 0, 1}, 0);
     btBoxShape box({1.5f, 1.5f, 0.1f});
-    Sheet sheet(1.5f);
+    SquarePlate quad(1.5f);
     const struct {
         const char* name;
         btCollisionShape& shape;
         float top;
-    } grounds[] = {{"plane", plane, 0}, {"box", box, 0.1f}, {"field", slab, 0.1f}, {"triangles", *sheet.shape, 0}};
+    } grounds[] = {{"plane", plane, 0}, {"box", box, 0.1f}, {"field", slab, 0.1f}, {"triangles", *quad.shape, 0}};
     for (const auto& ground : grounds)
         for (int i = 0; i < 40; ++i) {
             World world;

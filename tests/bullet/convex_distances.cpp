@@ -9,10 +9,10 @@
 #include <glm/vec2.hpp>
 #include <limits>
 
-#include "field_and_mesh.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/field_and_mesh.h"
+#include "tests/bullet/world.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::convex_distances_test {
 using namespace bilayer::detail;

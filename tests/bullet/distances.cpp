@@ -16,9 +16,9 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::distances_test {
 using namespace bilayer::detail;

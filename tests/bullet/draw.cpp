@@ -8,9 +8,9 @@
 
 #include <bilayer/integration/bullet/draw.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
-#include "world.h"
+#include "tests/bullet/world.h"
 
 namespace bilayer::draw_test {
 using namespace bilayer::test;

@@ -10,16 +10,17 @@
 #include <random>
 
 #include <bilayer/collider/contact.h>
-#include "collider/contact/collider_data.h"
-#include "collider/contact/convex.h"
-#include "collider/contact/narrow_phase.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/contact/open_surface/triangle_contacts.h"
+#include "collider/contact/search/convex_contacts.h"
+#include "collider/contact/shapes/convex.h"
 #include "demos/shared/exact_distance.h"
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/world.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::edges_test {
 using namespace bilayer::detail;

@@ -10,8 +10,8 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/world.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::test {
 

@@ -8,9 +8,9 @@
 #include <stdexcept>
 
 #include "demos/shared/world.h"
+#include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::gyroscopic_integrator_test {
 using namespace bilayer::detail;

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "demos/shared/shapes.h"
+#include "tests/bullet/world.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::manifolds_test {
 using namespace bilayer::detail;

@@ -13,7 +13,7 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
-#include "world.h"
+#include "tests/bullet/world.h"
 
 namespace bilayer::moving_test {
 using namespace bilayer::detail;

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "integration/bullet/detail/velocity.h"
+#include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::multibodies_test {
 using namespace bilayer::detail;

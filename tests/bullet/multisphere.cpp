@@ -10,14 +10,14 @@
 #include <random>
 
 #include <bilayer/collider/contact.h>
-#include "collider/contact/multisphere.h"
-#include "collider/contact/narrow_phase.h"
+#include "collider/contact/search/convex_contacts.h"
+#include "collider/contact/shapes/multisphere.h"
 #include "demos/shared/exact_distance.h"
 #include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/world.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::multisphere_test {
 using namespace bilayer::detail;

@@ -12,12 +12,12 @@
 #include <vector>
 
 #include <bilayer/collider/contact.h>
-#include "collider/contact/narrow_phase.h"
+#include "collider/contact/open_surface/triangle_contacts.h"
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/contact_shapes.h"
+#include "tests/bullet/world.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::open_surface_test {
 using namespace bilayer::detail;

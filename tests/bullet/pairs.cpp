@@ -12,10 +12,10 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/narrow_phase.h"
+#include "collider/contact/open_surface/triangle_contacts.h"
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/contact_shapes.h"
-#include "world.h"
+#include "tests/bullet/world.h"
 
 namespace bilayer::pairs_test {
 using namespace bilayer::detail;

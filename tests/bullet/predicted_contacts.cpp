@@ -6,9 +6,9 @@
 
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::predicted_contacts_test {
 using namespace bilayer::detail;

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/bullet/world.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::rest_stabilisation_test {
 using namespace bilayer::detail;

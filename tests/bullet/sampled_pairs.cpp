@@ -11,8 +11,7 @@
 #include <bilayer/cl/field.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/narrow_phase.h"
-#include "collider/contact/sampled_contacts.h"
+#include "collider/contact/search/sampled_contacts.h"
 #include "demos/shared/shapes.h"
 #include "tests/bullet/world.h"
 #include "tests/support/random.h"

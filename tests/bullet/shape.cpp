@@ -11,7 +11,7 @@
 
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "world.h"
+#include "tests/bullet/world.h"
 
 namespace bilayer::shape_test {
 using namespace bilayer::test;

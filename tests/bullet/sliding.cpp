@@ -14,9 +14,9 @@
 #include "demos/shared/shapes.h"
 #include "demos/shared/waves.h"
 #include "demos/shared/world.h"
+#include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::sliding_test {
 using namespace bilayer::test;

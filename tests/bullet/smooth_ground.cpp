@@ -8,14 +8,14 @@
 #include <vector>
 
 #include <bilayer/integration/bullet/extensions.h>
-#include "collider/contact/smooth_edge_angle.h"
+#include "collider/contact/open_surface/smooth_edge_angle.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/waves.h"
 #include "demos/shared/world.h"
 #include "integration/bullet/detail/smooth_ground.h"
+#include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::smooth_ground_test {
 using namespace bilayer::test;

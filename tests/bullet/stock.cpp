@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "demos/shared/shapes.h"
-#include "world.h"
+#include "tests/bullet/world.h"
 
 namespace bilayer::stock_test {
 using namespace bilayer::test;

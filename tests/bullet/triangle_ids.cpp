@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "integration/bullet/detail/convert.h"
+#include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "world.h"
 
 namespace bilayer::triangle_ids_test {
 using namespace bilayer::detail;

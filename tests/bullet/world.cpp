@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "world.h"
-#include "collider/contact/collider_data.h"
+#include "tests/bullet/world.h"
+#include "collider/contact/body/collider_data.h"
 
 #include <algorithm>
 #include <cmath>

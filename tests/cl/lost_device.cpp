@@ -14,7 +14,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include "cl/detail/program.h"
-#include "collider/contact/sampled_contacts.h"
+#include "collider/contact/search/sampled_contacts.h"
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 

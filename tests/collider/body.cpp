@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "collider/contact/body.h"
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/body.h"
+#include "collider/contact/body/collider_data.h"
 
 #include <oneapi/tbb/parallel_for.h>
 #include <openvdb/points/PointAttribute.h>

@@ -9,12 +9,12 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "tests/collider/touching_bodies.h"
 #include "tests/support/contacts.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "touching_bodies.h"
 
 namespace bilayer::collide_test {
 using namespace bilayer::detail;

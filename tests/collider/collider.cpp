@@ -12,7 +12,7 @@
 #include <bilayer/collider/contact.h>
 #include <bilayer/collider/mass.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/analytic.h"
 #include "tests/support/contacts.h"

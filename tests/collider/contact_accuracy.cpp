@@ -9,15 +9,15 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/threads.h"
+#include "tests/collider/touching_bodies.h"
 #include "tests/support/analytic.h"
 #include "tests/support/contacts.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
-#include "touching_bodies.h"
 
 namespace bilayer::contact_accuracy_test {
 using namespace bilayer::detail;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The cache of previous steps changes only the speed of the search, never the contacts.
-#include "collider/contact/contact_cache.h"
+#include "collider/contact/reduction/contact_cache.h"
 
 #include <catch2/catch.hpp>
 #include <cstring>

@@ -13,8 +13,8 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/contact_reduction.h"
-#include "collider/contact/first_contacts.h"
+#include "collider/contact/reduction/contact_reduction.h"
+#include "collider/contact/reduction/first_contacts.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"

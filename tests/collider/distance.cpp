@@ -12,9 +12,9 @@
 #include <bilayer/collider/distance.h>
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "collider/contact/triangle_distance.h"
+#include "collider/contact/distance/triangle_distance.h"
 #include "demos/shared/shapes.h"
-#include "surface_distance.h"
+#include "tests/collider/surface_distance.h"
 #include "tests/support/random_pose.h"
 #include "tests/support/support.h"
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <random>
 
-#include "collider/contact/edge_search.h"
+#include "collider/contact/search/edge_search.h"
 #include "tests/support/support.h"
 
 namespace bilayer::edge_search_test {

@@ -12,8 +12,8 @@
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
-#include "collider/contact/collider_data.h"
-#include "collider/field/field_data.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/field/samples/field_data.h"
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "tests/support/random.h"

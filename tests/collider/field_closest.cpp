@@ -18,9 +18,9 @@
 #include <bilayer/collider/field.h>
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "collider/field/triangle_tests.h"
+#include "collider/field/triangles/triangle_tests.h"
 #include "demos/shared/shapes.h"
-#include "query_points.h"
+#include "tests/collider/query_points.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

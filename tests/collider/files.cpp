@@ -19,8 +19,8 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/surface.h>
 #include <bilayer/sdf/vdb_io.h>
-#include "collider/contact/body.h"
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/body.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb_points.h"
 #include "tests/support/random.h"

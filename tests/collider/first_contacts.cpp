@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <bilayer/collider/contact.h>
-#include "collider/contact/contact_reduction.h"
+#include "collider/contact/reduction/contact_reduction.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

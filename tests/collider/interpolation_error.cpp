@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds cells whose samples are off from the mesh, compared with brute-force distances.
-#include "collider/contact/interpolation_error.h"
-#include "collider/contact/collider_data.h"
-#include "collider/field/field_data.h"
+#include "collider/contact/body/interpolation_error.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/field/samples/field_data.h"
 
 #include <oneapi/tbb/parallel_for.h>
 

@@ -5,7 +5,7 @@
 
 #include <bilayer/collider/collider.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/local_field.h"
+#include "collider/contact/search/local_field.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"

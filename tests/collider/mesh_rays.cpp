@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ray and box searches among triangles against brute force in double precision, by other formulas.
-#include "collider/field/mesh_rays.h"
+#include "collider/field/triangles/mesh_rays.h"
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -14,9 +14,9 @@
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "collider/field/box_overlaps.h"
-#include "collider/field/sphere_tracing.h"
-#include "collider/field/triangle_tests.h"
+#include "collider/field/queries/sphere_tracing.h"
+#include "collider/field/triangles/box_overlaps.h"
+#include "collider/field/triangles/triangle_tests.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -207,7 +207,7 @@ TEST_CASE("a sphere first touches the triangle that all triangles say") {
             path.origin += std::max(0.0, start - radius - random(0, 1) * length) * path.direction;
             path.length = length;
             if (truth.distance(path.origin) < radius + tolerance) continue;
-            const auto hit = firstTouch(tree, path, radius);
+            const auto hit = castSphere(tree, path, radius);
             const double end = hit ? hit->along : path.length;
             CAPTURE(mesh.triangles.size(), i, radius / voxel, length / voxel);
             for (int k = 0; k <= 100; ++k) REQUIRE(truth.distance(path.at(0.01 * k * end)) > radius - tolerance);

@@ -10,12 +10,12 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/collider_data.h"
-#include "collider/contact/normal_filter.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/contact/search/normal_filter.h"
 #include "demos/shared/shapes.h"
+#include "tests/collider/touching_bodies.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "touching_bodies.h"
 
 namespace bilayer::normal_filter_test {
 using namespace bilayer::detail;
@@ -46,7 +46,7 @@ TEST_CASE("contacts with normals along the surface of their point are filtered o
             const bool ofB = contact.feature & featureOfB;
             const SurfacePoint point = pointOf((ofB ? b : a).collider, contact.feature & ~featureOfB);
             const float cosine = glm::dot((ofB ? b : a).pose.rotation * point.normal, contact.normal);
-            const bool isSeparated = contact.distance > -minFaceDepth * h && !point.isSharp;
+            const bool isSeparated = contact.distance > -minFaceDepthVoxels * h && !point.isSharp;
             const float least = isSeparated ? std::max(apart, 0.3f) : 0.3f;
             return (ofB ? cosine : -cosine) >= least;
         };
@@ -73,7 +73,7 @@ TEST_CASE("contacts with normals along the surface of their point are filtered o
             if (left.contains(contact.feature)) continue;
             const bool ofB = contact.feature & featureOfB;
             const SurfacePoint point = pointOf((ofB ? b : a).collider, contact.feature & ~featureOfB);
-            REQUIRE(contact.distance > -minFaceDepth * h);
+            REQUIRE(contact.distance > -minFaceDepthVoxels * h);
             REQUIRE_FALSE(point.isSharp);
             REQUIRE(std::abs(glm::dot((ofB ? b : a).pose.rotation * point.normal, contact.normal)) < 0.99997f);
             ++oblique;

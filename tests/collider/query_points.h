@@ -9,7 +9,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <vector>
 
-#include "collider/field/triangle_tests.h"
+#include "collider/field/triangles/triangle_tests.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"

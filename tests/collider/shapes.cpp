@@ -17,7 +17,7 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/hull.h"
+#include "collider/contact/shapes/hull.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"

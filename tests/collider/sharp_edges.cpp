@@ -6,7 +6,7 @@
 
 #include <bilayer/collider/collider.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/support.h"
 

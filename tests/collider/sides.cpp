@@ -14,7 +14,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "query_points.h"
+#include "tests/collider/query_points.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface_distance.h"
+#include "tests/collider/surface_distance.h"
 
 #include <oneapi/tbb/parallel_for.h>
 

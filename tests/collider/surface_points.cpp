@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "collider/contact/surface_points.h"
+#include "collider/contact/body/surface_points.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>

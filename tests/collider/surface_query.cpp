@@ -3,10 +3,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "collider/contact/surface_query.h"
+#include "collider/contact/search/surface_query.h"
+#include "tests/collider/touching_bodies.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
-#include "touching_bodies.h"
 
 namespace bilayer::surface_query_test {
 using namespace bilayer::detail;

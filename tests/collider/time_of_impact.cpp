@@ -15,7 +15,7 @@
 #include <bilayer/collider/distance.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "surface_distance.h"
+#include "tests/collider/surface_distance.h"
 #include "tests/support/random_pose.h"
 #include "tests/support/support.h"
 

@@ -12,9 +12,9 @@
 #include <span>
 #include <vector>
 
-#include "collider/contact/triangle_distance.h"
-#include "collider/contact/triangle_distance_lanes.h"
-#include "surface_distance.h"
+#include "collider/contact/distance/triangle_distance.h"
+#include "collider/contact/distance/triangle_distance_lanes.h"
+#include "tests/collider/surface_distance.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

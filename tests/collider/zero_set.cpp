@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <bilayer/collider/field.h>
-#include "collider/field/zero_queries.h"
-#include "collider/field/zero_search.h"
+#include "collider/field/zero/zero_queries.h"
+#include "collider/field/zero/zero_search.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"

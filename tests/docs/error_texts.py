@@ -40,7 +40,7 @@ def main():
     code, metadata = sources(root), (root / "docs" / "metadata.md").read_text()
     faults = [*missing_messages((root / "docs" / "errors.md").read_text(), code),
               *other_metadata(metadata, code),
-              *other_version(metadata, (root / "collider" / "contact" / "body.cpp").read_text())]
+              *other_version(metadata, (root / "collider" / "contact" / "body" / "body.cpp").read_text())]
     sys.exit("\n".join(faults) if faults else 0)
 
 

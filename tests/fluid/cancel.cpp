@@ -12,8 +12,8 @@
 #include <bilayer/integration/fluid/particles.h>
 #include <bilayer/integration/fluid/seed.h>
 #include "demos/shared/shapes.h"
-#include "liquids.h"
 #include "sdf/base/openvdb.h"
+#include "tests/fluid/liquids.h"
 
 namespace bilayer::cancel_test {
 using namespace bilayer::test;

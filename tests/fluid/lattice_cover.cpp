@@ -15,7 +15,7 @@
 #include <bilayer/integration/fluid/obstacle.h>
 #include <bilayer/integration/fluid/seed.h>
 #include "demos/shared/shapes.h"
-#include "liquids.h"
+#include "tests/fluid/liquids.h"
 #include "tests/support/support.h"
 
 namespace bilayer::lattice_cover_test {

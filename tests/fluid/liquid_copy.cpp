@@ -10,8 +10,8 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
-#include "liquids.h"
 #include "sdf/base/openvdb.h"
+#include "tests/fluid/liquids.h"
 
 namespace bilayer::liquid_copy_test {
 using namespace bilayer::test;

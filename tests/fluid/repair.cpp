@@ -13,8 +13,8 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/surface.h>
 #include "demos/shared/shapes.h"
-#include "liquids.h"
 #include "sdf/base/openvdb.h"
+#include "tests/fluid/liquids.h"
 #include "tests/support/profiles.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

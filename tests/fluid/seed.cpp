@@ -17,8 +17,8 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "liquids.h"
 #include "sdf/base/openvdb.h"
+#include "tests/fluid/liquids.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 

@@ -10,10 +10,10 @@
 
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "sdf/io/mesh_readers.h"
-#include "sdf/io/polygons.h"
-#include "sdf/io/read_gltf.h"
-#include "sdf/io/scene_io.h"
+#include "sdf/io/formats/mesh_readers.h"
+#include "sdf/io/polygon/polygons.h"
+#include "sdf/io/scenes/read_gltf.h"
+#include "sdf/io/scenes/scene_io.h"
 #include "tests/fuzz/checks.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/support.h"

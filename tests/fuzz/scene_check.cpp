@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "sdf/io/assimp_reader.h"
-#include "sdf/io/polygon_record.h"
-#include "sdf/io/polygons.h"
+#include "sdf/io/polygon/polygons.h"
+#include "sdf/io/scenes/assimp_reader.h"
+#include "sdf/io/scenes/polygon_record.h"
 #include "tests/fuzz/byte_source.h"
 #include "tests/fuzz/checks.h"
 

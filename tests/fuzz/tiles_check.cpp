@@ -10,9 +10,9 @@
 
 #include <bilayer/collider/field.h>
 #include <bilayer/sdf/grids.h>
-#include "collider/field/block_summary.h"
-#include "collider/field/field_layout.h"
-#include "collider/field/surface_file.h"
+#include "collider/field/layout/block_summary.h"
+#include "collider/field/layout/field_layout.h"
+#include "collider/field/layout/surface_file.h"
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/grid/vdb_grids.h"

@@ -7,7 +7,9 @@ import pathlib
 import re
 import sys
 
-MAX_LINES = 255
+MAX_LINES = 220
+# Field only passes queries on. Half of its lines are comments: what each query promises.
+LONGER = {("collider", "Field"): 255}
 FOLDERS = ["sdf", "collider", "cl", "integration", "tools", "demos", "bench", "tests"]
 # comments and texts, which may hold braces
 IGNORED = re.compile(r"//[^\n]*|R\"(\w*)\(.*?\)\1\"|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])'", re.DOTALL)
@@ -42,9 +44,10 @@ def main():
             for found in MEMBER.finditer(text):
                 members[(folder, found.group(1))] += lines(text, found.start() + 1, found.end() - 1)
     assert len(bodies) > 500, "classes are not found"
-    long = {name: count + members[name] for name, count in bodies.items() if count + members[name] > MAX_LINES}
-    for (folder, name), count in sorted(long.items()):
-        print(f"{name} of {folder} has {count} lines, {MAX_LINES} at most")
+    limits = {name: LONGER.get(name, MAX_LINES) for name in bodies}
+    long = {name: count + members[name] for name, count in bodies.items() if count + members[name] > limits[name]}
+    for name, count in sorted(long.items()):
+        print(f"{name[1]} of {name[0]} has {count} lines, {limits[name]} at most")
     sys.exit(bool(long))
 
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sources.h"
+#include "tests/house/sources.h"
 
 namespace bilayer::types_test {
 using namespace bilayer::test;

@@ -20,8 +20,8 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
-#include "refusing_new.h"
 #include "tests/bullet/world.h"
+#include "tests/memory/refusing_new.h"
 #include "tests/support/support.h"
 
 namespace bilayer::refused_test {

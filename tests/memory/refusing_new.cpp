@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "refusing_new.h"
+#include "tests/memory/refusing_new.h"
 
 #include <dlfcn.h>
 #include <execinfo.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "box_files.h"
+#include "tests/sdf/box_files.h"
 
 #include <fmt/format.h>
 #include <algorithm>

@@ -20,8 +20,8 @@
 #include <thread>
 #include <vector>
 
-#include "sdf/io/polygon_record.h"
-#include "sdf/io/scene_io.h"
+#include "sdf/io/scenes/polygon_record.h"
+#include "sdf/io/scenes/scene_io.h"
 #include "tests/support/gltf.h"
 #include "tests/support/polygons.h"
 #include "tests/support/support.h"

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "outlines.h"
+#include "tests/sdf/outlines.h"
 
 namespace bilayer::test {
 

@@ -10,9 +10,9 @@
 
 #include <bilayer/sdf/inspect.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "box_files.h"
 #include "demos/shared/shapes.h"
-#include "sdf/io/polygons.h"
+#include "sdf/io/polygon/polygons.h"
+#include "tests/sdf/box_files.h"
 #include "tests/support/support.h"
 
 namespace bilayer::mesh_readers_test {

@@ -6,8 +6,8 @@
 
 #include <bilayer/sdf/inspect.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "box_files.h"
 #include "demos/shared/shapes.h"
+#include "tests/sdf/box_files.h"
 
 namespace bilayer::obj_reader_test {
 using namespace bilayer::test;

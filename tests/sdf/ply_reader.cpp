@@ -9,7 +9,7 @@
 #include <utility>
 
 #include <bilayer/sdf/mesh_io.h>
-#include "box_files.h"
+#include "tests/sdf/box_files.h"
 #include "tests/support/support.h"
 
 namespace bilayer::ply_reader_test {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include <bilayer/sdf/mesh_io.h>
-#include "box_files.h"
+#include "tests/sdf/box_files.h"
 
 namespace bilayer::raw_reader_test {
 using namespace bilayer::test;

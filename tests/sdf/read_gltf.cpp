@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-#include "sdf/io/scene_io.h"
+#include "sdf/io/scenes/scene_io.h"
 #include "tests/support/gltf.h"
 #include "tests/support/gltf_refusals.h"
 #include "tests/support/polygons.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sdf/io/scene_io.h"
+#include "sdf/io/scenes/scene_io.h"
 
 #include <unistd.h>
 

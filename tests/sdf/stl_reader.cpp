@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include <bilayer/sdf/mesh_io.h>
-#include "box_files.h"
+#include "tests/sdf/box_files.h"
 
 namespace bilayer::stl_reader_test {
 using namespace bilayer::test;

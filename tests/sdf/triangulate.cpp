@@ -8,10 +8,10 @@
 #include <utility>
 
 #include <bilayer/sdf/inspect.h>
-#include "lattice_walk.h"
-#include "outlines.h"
-#include "sdf/io/triangulate.h"
+#include "sdf/io/polygon/triangulate.h"
 #include "sdf/sign/sign_choice.h"
+#include "tests/sdf/lattice_walk.h"
+#include "tests/sdf/outlines.h"
 #include "tests/support/support.h"
 
 namespace bilayer::triangulate_test {

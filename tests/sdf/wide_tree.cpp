@@ -4,11 +4,14 @@
 #include <oneapi/tbb/global_control.h>
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstring>
+#include <glm/geometric.hpp>
 #include <random>
 #include <set>
 
 #include "demos/shared/shapes.h"
+#include "sdf/base/perpendicular.h"
 #include "sdf/bvh/node_list.h"
 #include "tests/support/support.h"
 
@@ -128,6 +131,24 @@ TEST_CASE("narrowing keeps all nodes near the voxels and opens large ones") {
                 if (distance > 3.001) wrong += found.count(node) != 0;
             }
         CHECK(wrong == 0);
+    }
+}
+
+TEST_CASE("a perpendicular direction has unit length, in single and double precision") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> any;
+    for (int i = 0; i < 1000; ++i) {
+        // every third one near an axis
+        glm::dvec3 unit(any(random), any(random), any(random));
+        if (i % 3 == 0) unit[i % 9 / 3] *= 1e9;
+        unit = glm::normalize(unit);
+        const glm::dvec3 across = perpendicularTo(unit), single(perpendicularTo(glm::vec3(unit)));
+        CHECK(std::abs(glm::dot(across, unit)) < 1e-15);
+        CHECK(std::abs(glm::length(across) - 1) < 1e-15);
+        CHECK(std::abs(glm::dot(single, unit)) < 1e-6);
+        CHECK(std::abs(glm::length(single) - 1) < 1e-6);
     }
 }
 

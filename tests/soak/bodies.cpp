@@ -13,8 +13,8 @@
 #include <bilayer/integration/bullet/extensions.h>
 #include <bilayer/integration/bullet/shape.h>
 #include "demos/shared/shapes.h"
-#include "soak.h"
 #include "tests/bullet/world.h"
+#include "tests/soak/soak.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

@@ -13,7 +13,7 @@
 #include <bilayer/collider/field.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "soak.h"
+#include "tests/soak/soak.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

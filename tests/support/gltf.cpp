@@ -4,7 +4,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "sdf/io/scene_io.h"
+#include "sdf/io/scenes/scene_io.h"
 #include "tests/support/support.h"
 
 namespace bilayer::test {

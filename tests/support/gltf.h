@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "sdf/io/polygons.h"
+#include "sdf/io/polygon/polygons.h"
 
 namespace bilayer::test {
 

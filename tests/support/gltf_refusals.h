@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sdf/io/scene_io.h"
+#include "sdf/io/scenes/scene_io.h"
 #include "tests/support/gltf.h"
 
 namespace bilayer::test {

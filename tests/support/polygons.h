@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <string>
 
-#include "sdf/io/polygons.h"
+#include "sdf/io/polygon/polygons.h"
 
 namespace bilayer::test {
 

@@ -11,7 +11,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"

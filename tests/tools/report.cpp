@@ -9,7 +9,7 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
-#include "collider/contact/collider_data.h"
+#include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"

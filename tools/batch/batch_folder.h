@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a batch keeps its files.
-// Tested by tests/tools/batch.cpp through run().
+// Tested by tests/tools/batch.cpp through the program.
 #pragma once
 
 #include <filesystem>

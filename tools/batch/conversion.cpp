@@ -19,7 +19,7 @@
 #include "sdf/base/openvdb.h"
 #include "sdf/io/content_hash.h"
 #include "sdf/io/mapped_file.h"
-#include "sdf/io/vdb_checksum.h"
+#include "sdf/io/vdb/vdb_checksum.h"
 #include "sdf/leaf/build_options.h"
 #include "sdf/leaf/build_size.h"
 #include "tools/batch/batch_folder.h"

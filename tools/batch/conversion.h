@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // From one mesh file to one field file: what a worker of a batch does.
-// Tested by tests/tools/batch.cpp through run().
+// Tested by tests/tools/batch.cpp through the program.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Locks of outputs, for batches that overlap.
-// Tested by tests/tools/batch.cpp through run().
+// Tested by tests/tools/batch.cpp through the program.
 #pragma once
 
 #include <sys/types.h>

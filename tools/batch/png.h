@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small greyscale pictures as PNG files.
-// Tested by tests/tools/batch_report.cpp through run().
+// Tested by tests/tools/batch_report.cpp through the program.
 #pragma once
 
 #include <cstdint>

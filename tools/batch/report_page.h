@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The report of a batch as a page.
-// Tested by tests/tools/batch_report.cpp through run().
+// Tested by tests/tools/batch_report.cpp through the program.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs the conversions of a batch.
-// Tested by tests/tools/batch_limits.cpp through run().
+// Tested by tests/tools/batch_limits.cpp through the program.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shares of a batch for several machines.
-// Tested by tests/tools/batch.cpp through run().
+// Tested by tests/tools/batch.cpp through the program.
 #pragma once
 
 #include <cstdint>

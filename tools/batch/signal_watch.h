@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Signals that end a batch, as something to wait for.
-// Tested by tests/tools/batch_limits.cpp through run().
+// Tested by tests/tools/batch_limits.cpp through the program.
 #pragma once
 
 #include <signal.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the records of a batch say together.
-// Tested by tests/tools/batch_report.cpp through run().
+// Tested by tests/tools/batch_report.cpp through the program.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Folders for files that are not finished.
-// Tested by tests/tools/batch_limits.cpp through run().
+// Tested by tests/tools/batch_limits.cpp through the program.
 #pragma once
 
 #include <filesystem>

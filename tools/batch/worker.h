@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Processes that convert meshes, one after the other.
-// Tested by tests/tools/batch_limits.cpp through run().
+// Tested by tests/tools/batch_limits.cpp through the program.
 #pragma once
 
 #include <sys/types.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The files of column sums, by which tiles know the winding numbers below them.
-// Tested by tests/tools/tile_signs.cpp through sameInTiles().
+// Tested by tests/tools/tile_signs.cpp through the program.
 #pragma once
 
 #include <cstdint>

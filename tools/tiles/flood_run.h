@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The steps of a build in tiles whose signs are by flood. Ranks exchange the borders of tiles through files.
-// Tested by tests/tools/tile_floods.cpp through run().
+// Tested by tests/tools/tile_floods.cpp through the program.
 #pragma once
 
 #include <cstddef>

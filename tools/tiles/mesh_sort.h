@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The first pass of a build in tiles: reads the mesh, decides the signs of all tiles, sorts the triangles by tile, and
 // writes the plan.
-// Tested by tests/tools/tiles.cpp through run().
+// Tested by tests/tools/tiles.cpp through the program.
 #pragma once
 
 #include "sdf/tiles/tile_signs.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The signs of a field in tiles, in its plan and in the records of its tiles.
-// Tested by tests/tools/tile_signs.cpp through sameInTiles().
+// Tested by tests/tools/tile_signs.cpp through the program.
 #pragma once
 
 #include "sdf/tiles/tile_build.h"

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include <bilayer/sdf/grids.h>
-#include "collider/field/block_summary.h"
+#include "collider/field/layout/block_summary.h"
 #include "sdf/base/stopwatch.h"
 #include "sdf/grid/vdb_grids.h"
 #include "sdf/io/content_hash.h"

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Builds tiles of a plan, and writes their files and records.
-// Tested by tests/tools/tiles.cpp through run().
+// Tested by tests/tools/tiles.cpp through the program.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
 #include <vector>
 
-#include "collider/field/surface_file.h"
+#include "collider/field/layout/surface_file.h"
 #include "sdf/tiles/tile_build.h"
 #include "tools/tiles/column_files.h"
 #include "tools/tiles/flood_run.h"

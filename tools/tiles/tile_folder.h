@@ -2,7 +2,7 @@
 // Where the tiles of a field are kept: a .vdb and a .cells file for each tile, manifest.json when all are there, and a
 // folder `work` while some are missing.
 //
-// Tested by tests/tools/tiles.cpp through run().
+// Tested by tests/tools/tiles.cpp through the program.
 #pragma once
 
 #include <cstdint>

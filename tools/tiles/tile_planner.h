@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The first rank's part of a build in tiles: it plans the field, resumes an earlier plan, and plans again.
-// Tested by tests/tools/tiles.cpp through run().
+// Tested by tests/tools/tiles.cpp through the program.
 #pragma once
 
 #include <glm/vec3.hpp>

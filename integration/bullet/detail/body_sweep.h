@@ -4,7 +4,7 @@
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
-#include "collider/contact/sweep.h"
+#include "collider/contact/impact/sweep.h"
 
 namespace bilayer::bullet::detail {
 

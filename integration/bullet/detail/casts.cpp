@@ -6,8 +6,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "collider/field/interpolant.h"
-#include "collider/field/sphere_tracing.h"
+#include "collider/field/layout/interpolant.h"
+#include "collider/field/queries/sphere_tracing.h"
 
 namespace bilayer::bullet::detail {
 
@@ -67,7 +67,7 @@ std::optional<CastHit> castSphereOn(const MeshTree& mesh, const glm::vec3& from,
     const double length = glm::length(displacement);
     if (!(length > 0)) return std::nullopt;
     const Path path{glm::dvec3(from), displacement / length, length};
-    const auto touch = firstTouchOnPath(mesh, path, radius, [](const glm::dvec3&) { return 0.; });
+    const auto touch = castSphereFar(mesh, path, radius, [](const glm::dvec3&) { return 0.; });
     if (!touch) return std::nullopt;
     return CastHit{static_cast<float>(touch->along / length), glm::vec3(touch->position), glm::vec3(touch->normal),
                    static_cast<int>(touch->triangle)};

@@ -6,7 +6,7 @@
 
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
-#include "collider/field/mesh_tree.h"
+#include "collider/field/triangles/mesh_tree.h"
 
 namespace bilayer::bullet::detail {
 

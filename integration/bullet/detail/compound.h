@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Collision of compounds that hold fields.
-// Tested by tests/bullet/compound.cpp through btCompoundShape.
+// Tested by tests/bullet/compound.cpp through bullet::Dispatcher.
 #pragma once
 
 #include <map>

@@ -23,7 +23,7 @@
 #include <vector>
 
 #include <bilayer/integration/bullet/shape.h>
-#include "collider/contact/shape_data.h"
+#include "collider/contact/shapes/shape_data.h"
 #include "integration/bullet/detail/convert.h"
 
 namespace bilayer::bullet::detail {

@@ -9,7 +9,7 @@
 #include <array>
 
 #include <bilayer/collider/shapes.h>
-#include "collider/contact/convex.h"
+#include "collider/contact/shapes/convex.h"
 
 namespace bilayer::bullet::detail {
 

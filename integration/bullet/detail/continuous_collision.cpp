@@ -17,7 +17,7 @@
 #include <vector>
 
 #include <bilayer/integration/bullet/shape.h>
-#include "collider/contact/penetration.h"
+#include "collider/contact/impact/penetration.h"
 #include "integration/bullet/detail/body_sweep.h"
 #include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
@@ -151,7 +151,7 @@ std::optional<float> marginOf(const btCollisionObject& object) {
 /// The pairs in which a fast body may have tunnelled in a step.
 class SweptPairs {
   public:
-    SweptPairs(btDynamicsWorld& world, float seconds, const StatesBefore<btTransform>& starts,
+    SweptPairs(btDynamicsWorld& world, float seconds, const RecordedStates<btTransform>& starts,
                const RecentlyFastBodies& fastBefore)
         : world_(world), seconds_(seconds), starts_(starts), fastBefore_(fastBefore) {
         const btCollisionObjectArray& objects = world.getCollisionObjectArray();
@@ -280,7 +280,7 @@ class SweptPairs {
 
     btDynamicsWorld& world_;
     float seconds_;
-    const StatesBefore<btTransform>& starts_;
+    const RecordedStates<btTransform>& starts_;
     const RecentlyFastBodies& fastBefore_;
     float minMargin_ = std::numeric_limits<float>::infinity();  ///< of all fields
     std::vector<BodySweep> fast_;                               ///< in the world's order

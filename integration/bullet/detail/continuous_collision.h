@@ -8,7 +8,7 @@
 #include <array>
 #include <vector>
 
-#include "integration/bullet/detail/states_before.h"
+#include "integration/bullet/detail/recorded_states.h"
 
 namespace bilayer::bullet::detail {
 
@@ -54,7 +54,7 @@ class ContinuousCollision {
   private:
     btDynamicsWorld& world_;
     const btDispatcher* const dispatcher_;
-    StatesBefore<btTransform> starts_;
+    RecordedStates<btTransform> starts_;
     RecentlyFastBodies fastBodies_;
     std::vector<StoppedPair> stoppedPairs_;  ///< in the last step
     int stopped_ = 0;

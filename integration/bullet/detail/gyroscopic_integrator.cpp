@@ -44,19 +44,20 @@ void GyroscopicIntegrator::beforeStep(float seconds) {
         body->setFlags(body->getFlags() & ~gyroscopic);
         const btMatrix3x3& axes = body->getWorldTransform().getBasis();
         const btVector3 momentum = momentumOf(*body, axes, body->getAngularVelocity());
-        btVector3 midway = body->getAngularVelocity();
-        for (int k = 0; k < iterations; ++k) midway = spinOf(*body, rotated(axes, seconds / 2 * midway), momentum);
-        body->setAngularVelocity(midway);
-        bodies_.push_back({i, body, axes, momentum, midway});
+        btVector3 midStepVelocity = body->getAngularVelocity();
+        for (int k = 0; k < iterations; ++k)
+            midStepVelocity = spinOf(*body, rotated(axes, seconds / 2 * midStepVelocity), momentum);
+        body->setAngularVelocity(midStepVelocity);
+        bodies_.push_back({i, body, axes, momentum, midStepVelocity});
     }
 }
 
 void GyroscopicIntegrator::afterStep() {
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
-    for (const auto& [index, body, axes, momentum, midway] : bodies_) {
+    for (const auto& [index, body, axes, momentum, midStepVelocity] : bodies_) {
         // a user's callback may have removed it
         if (index >= objects.size() || objects[index] != body) continue;
-        const btVector3 gained = momentumOf(*body, axes, body->getAngularVelocity() - midway);
+        const btVector3 gained = momentumOf(*body, axes, body->getAngularVelocity() - midStepVelocity);
         body->setAngularVelocity(spinOf(*body, body->getWorldTransform().getBasis(), momentum + gained));
     }
     bodies_.clear();

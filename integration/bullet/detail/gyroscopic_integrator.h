@@ -21,9 +21,9 @@ class GyroscopicIntegrator {
     struct RotatingBody {
         int index;  // in the world's array of objects
         btRigidBody* body;
-        btMatrix3x3 axes;    // before the step
-        btVector3 momentum;  // before the step [kg m^2 / s]
-        btVector3 midway;    // angular velocity in the middle of the step, without external torques [rad/s]
+        btMatrix3x3 axes;           // before the step
+        btVector3 momentum;         // before the step [kg m^2 / s]
+        btVector3 midStepVelocity;  // angular velocity in the middle of the step, without external torques [rad/s]
     };
 
     btDynamicsWorld& world_;

@@ -7,7 +7,7 @@
 #include <typeinfo>
 #include <utility>
 
-#include "collider/contact/contact_groups.h"
+#include "collider/contact/reduction/contact_groups.h"
 #include "integration/bullet/detail/convert.h"
 #include "integration/bullet/detail/velocity.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes contacts into Bullet's manifolds, and carries impulses and friction anchors from step to step.
-// Tested by tests/bullet/manifolds.cpp through btPersistentManifold.
+// Tested by tests/bullet/manifolds.cpp through bullet::Dispatcher.
 #pragma once
 
 #include <BulletCollision/BroadphaseCollision/btDispatcher.h>
@@ -12,8 +12,8 @@
 #include <span>
 #include <vector>
 
-#include "collider/contact/contact_reduction.h"
-#include "collider/contact/predicted_contacts.h"
+#include "collider/contact/reduction/contact_reduction.h"
+#include "collider/contact/search/predicted_contacts.h"
 #include "integration/bullet/detail/triangle_ids.h"
 
 namespace bilayer::bullet::detail {

@@ -8,10 +8,10 @@
 
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/shape.h>
-#include "collider/contact/contact_range.h"
-#include "collider/contact/edge_probes.h"
-#include "collider/contact/narrow_phase.h"
-#include "collider/contact/predicted_contacts.h"
+#include "collider/contact/search/contact_range.h"
+#include "collider/contact/search/edge_probes.h"
+#include "collider/contact/search/predicted_contacts.h"
+#include "collider/contact/shape_contacts.h"
 #include "integration/bullet/detail/convert.h"
 #include "integration/bullet/detail/velocity.h"
 

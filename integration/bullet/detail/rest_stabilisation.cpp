@@ -80,12 +80,12 @@ bool RestStabilisation::stays(ObjectState& state, const btRigidBody& body, float
     if (state.object != &body || !comesFrom(state.transform, body, seconds)) return false;
     const float speed = speedOf(body, velocitiesOf(body), seconds);
     if (!state.isHeld) return speed < restSpeed && speed <= state.speed;
-    const bool isCalm = changeOf(body, state.calm, seconds) < pushSpeed;
+    const bool isUnpushed = changeOf(body, state.beforePush, seconds) < pushSpeed;
     const bool isSteady = changeOf(body, state.last, seconds) < pushSpeed;
-    const bool hasGrown = speed >= releaseSpeed && speedOf(body, state.last - state.calm, seconds) >= pushSpeed;
-    if (isCalm) state.calm = velocitiesOf(body);
-    state.pushes = isCalm || !isSteady ? 0 : state.pushes + 1;
-    return isCalm || hasGrown || (speed < releaseSpeed && state.pushes < pushSteps);
+    const bool hasGrown = speed >= releaseSpeed && speedOf(body, state.last - state.beforePush, seconds) >= pushSpeed;
+    if (isUnpushed) state.beforePush = velocitiesOf(body);
+    state.pushes = isUnpushed || !isSteady ? 0 : state.pushes + 1;
+    return isUnpushed || hasGrown || (speed < releaseSpeed && state.pushes < pushSteps);
 }
 
 /// Holds a body at its pose. A released body gets the velocity that it had at first; otherwise an oscillating body
@@ -94,7 +94,7 @@ void RestStabilisation::hold(ObjectState& state, btRigidBody& body, float second
     const Velocities velocities = velocitiesOf(body);
     const float speed = speedOf(body, velocities, seconds);
     if (!state.isHeld) {
-        state.calm = velocities;
+        state.beforePush = velocities;
         state.pushes = 0;
         state.speed = speed;
     }

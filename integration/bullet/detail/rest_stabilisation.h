@@ -30,9 +30,9 @@ class RestStabilisation {
     struct ObjectState {
         const btCollisionObject* object = nullptr;
         btTransform transform = btTransform::getIdentity();
-        Velocities last{};  ///< of the body, in the last step
-        Velocities calm{};  ///< for a held body: before it was pushed
-        int pushes = 0;     ///< steps since the push began
+        Velocities last{};        ///< of the body, in the last step
+        Velocities beforePush{};  ///< for a held body: before it was pushed
+        int pushes = 0;           ///< steps since the push began
         /// Speed of the farthest point at the end of the last step; for a held body, when it was first held [fractions
         /// of the speed that gravity adds in a step].
         float speed = 0;

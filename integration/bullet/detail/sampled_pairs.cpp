@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integration/bullet/detail/sampled_pairs.h"
 #include <bilayer/collider/contact.h>
-#include "collider/contact/sampled_contacts.h"
+#include "collider/contact/search/sampled_contacts.h"
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pairs of fields of a step whose points a sampler samples in one batch, for example on an OpenCL device.
-// Tested by tests/bullet/sampled_pairs.cpp through PointSampler.
+// Tested by tests/bullet/sampled_pairs.cpp through bullet::Dispatcher.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@
 
 #include <bilayer/collider/collider.h>
 #include <bilayer/collider/contact.h>
-#include "collider/contact/sampled_contacts.h"
-#include "collider/contact/sampled_points.h"
+#include "collider/contact/search/sampled_contacts.h"
+#include "collider/contact/search/sampled_points.h"
 
 namespace bilayer::bullet::detail {
 

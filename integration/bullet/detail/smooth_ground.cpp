@@ -10,8 +10,8 @@
 
 #include <bilayer/integration/bullet/shape.h>
 
-#include "collider/contact/collider_data.h"
-#include "collider/contact/smooth_edge_angle.h"
+#include "collider/contact/body/collider_data.h"
+#include "collider/contact/open_surface/smooth_edge_angle.h"
 #include "integration/bullet/detail/body_sweep.h"
 #include "integration/bullet/detail/compound.h"
 #include "integration/bullet/detail/contact_shapes.h"
@@ -118,7 +118,7 @@ float FacetImpact::tipping(float angle) const {
 
 float FacetImpact::loss(float angle) const {
     const float deflected = speed * std::tan(angle);
-    const float tipped = std::min((mobility - 1) * tipping(angle), turning * turning);
+    const float tipped = std::min((mobility - 1) * tipping(angle), rotationSpeed * rotationSpeed);
     const float caused = maxEnergyRatio * mobility * deflected * deflected + tipped, approach = before * before;
     return -0.5f * impulse * (before + after) * (caused < approach ? caused / approach : 1);
 }

@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "integration/bullet/detail/states_before.h"
+#include "integration/bullet/detail/recorded_states.h"
 #include "integration/bullet/detail/velocity.h"
 
 namespace bilayer::bullet::detail {
@@ -23,7 +23,7 @@ struct FacetImpact {
     float mobility;  ///< the contact point's inverse effective mass times the body's mass; 1 in line with the centre
     float arm;       ///< distance of the contact point from the body's centre [m]
     float gravity;   ///< towards the triangle [m/s^2]
-    float turning;   ///< what the body's rotation contributes to `before` [m/s]
+    float rotationSpeed;  ///< what the body's rotation contributes to `before` [m/s]
 
     /// The energy that the impact takes, up to what edges whose angles sum to this can cause [J]. Negative: it adds
     /// energy. The edges deflect the body, and it tips over them.
@@ -39,10 +39,10 @@ struct FacetFriction {
     btVector3 before, after;  ///< velocities of the contact point along the triangle, as those of FacetImpact [m/s]
     float speed;              ///< of the body's centre along the triangle, before the step [m/s]
 
-    /// The energy that the friction takes from a body that rolls over edges whose angles sum to this [J]; 0 for a body
-    /// that slips by more than that causes. The contact point is off the ideal one by up to the angle, so it moves
-    /// along the triangle at speed * (1 - cos(angle)), and impacts that far from the centre change the rotation by as
-    /// much.
+    /// The energy that the friction takes from a body that rolls over edges whose angles sum to this [J]. The angle
+    /// moves the contact point away from where it would be on a smooth surface. So the point slips along the triangle
+    /// at up to speed * (1 - cos(angle)), and impacts there change the rotation by as much. 0 for a body that slips
+    /// faster.
     float loss(float angle) const;
 };
 
@@ -61,7 +61,7 @@ class SmoothGround {
     float lossIn(const btPersistentManifold& manifold, const Ground& ground, float seconds);
 
     btDynamicsWorld& world_;
-    StatesBefore<Velocity> before_;       ///< only active bodies have a velocity
+    RecordedStates<Velocity> before_;     ///< only active bodies have a velocity
     std::map<Ground, float> edgeAngles_;  ///< those asked for in this step [rad]
 };
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "collider/contact/nearest_on_triangle.h"
+#include "collider/contact/shapes/nearest_on_triangle.h"
 #include "integration/bullet/detail/convert.h"
 
 namespace bilayer::bullet::detail {

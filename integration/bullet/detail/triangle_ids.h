@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Finds the triangle of a mesh or a height field that a contact touches, for example to look up a material; internal.
-// Tested by tests/bullet/triangle_ids.cpp through btConcaveShape.
+// Tested by tests/bullet/triangle_ids.cpp through bullet::Dispatcher.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>

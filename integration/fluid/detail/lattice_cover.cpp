@@ -18,6 +18,7 @@
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/divided_cubes.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/bvh/triangle_tree.h"
@@ -33,7 +34,7 @@ namespace {
 /// Lattices along an axis. The cubes of the smallest side are centred at their voxels.
 constexpr int lattices = 4;
 /// Count of cubes that are divided at once, and of those after which the search gives up.
-constexpr std::size_t batchSize = 64, maxCubes = 4096;
+constexpr std::size_t cubesAtOnce = 64, maxCubes = 4096;
 /// Count of triangles from which a climb starts, and the first and last depth behind them [voxels].
 constexpr std::size_t climbs = 64;
 constexpr double firstDepth = 1e-2, lastDepth = 1e-5;
@@ -90,19 +91,16 @@ class CoverSearch {
     std::optional<bool> run() {
         std::priority_queue<Cube> cubes;
         cubes.push(whole());
-        for (std::size_t count = 0; !cubes.empty() && !covered_.all(); count += batchSize) {
+        for (std::size_t count = 0; !cubes.empty() && !covered_.all(); count += cubesAtOnce) {
             if (count >= maxCubes) return std::nullopt;
             std::vector<Cube> batch;
-            for (; batch.size() < batchSize && !cubes.empty(); cubes.pop())
+            for (; batch.size() < cubesAtOnce && !cubes.empty(); cubes.pop())
                 if (isNeeded(cubes.top())) batch.push_back(cubes.top());
-            std::vector<std::vector<Cube>> parts(batch.size());
-            tbb::parallel_for(std::size_t(0), batch.size(), [&](std::size_t i) { parts[i] = divided(batch[i]); });
-            for (const std::vector<Cube>& some : parts)
-                for (const Cube& cube : some)
-                    if (cube.side > 1)
-                        cubes.push(cube);
-                    else
-                        covered_.set(latticeOf(cube.lower));
+            for (const Cube& part : divided(batch, [&](const Cube& cube) { return octantsOf(cube); }))
+                if (part.side > 1)
+                    cubes.push(part);
+                else
+                    covered_.set(latticeOf(part.lower));
         }
         return covered_.all();
     }
@@ -130,7 +128,7 @@ class CoverSearch {
     }
 
     /// Returns the octants with deep points.
-    std::vector<Cube> divided(const Cube& cube) const {
+    std::vector<Cube> octantsOf(const Cube& cube) const {
         poll(progress_);
         std::vector<Cube> parts;
         for (int octant = 0; octant < 8; ++octant) {
