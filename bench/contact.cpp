@@ -257,7 +257,7 @@ void compareDevice(const Options& options) {
     pile.seconds = options.growSeconds;
     pile.measuredFrames = 1;
     const Device device = openDevice();
-    const OpenclPointSampler sampler = openclPointSampler(device, {.profile = true});
+    const PointSampler sampler = openclPointSampler(device, {.profile = true});
     const auto processor = makeField(mesh, options.voxels);
     const auto sampled = makeField(mesh, options.voxels, sampler);
     fmt::print("\n## Points sampled by {}: {:g} s of knots, {:g} voxels each\n\n", device.info().name, pile.seconds,
@@ -267,11 +267,8 @@ void compareDevice(const Options& options) {
         "that differ |\n|---|---|---|---|---|---|\n");
     for (const int bodies : options.growBodies) {
         const Row ours = playKnots(*processor, mesh, bodies, pile);
-        const OpenclTimes before = sampler.times();
         const Row theirs = playKnots(*sampled, mesh, bodies, pile);
-        const OpenclTimes after = sampler.times();
-        const double kernels = after.kernels - before.kernels,
-                     transfers = after.upload + after.download - before.upload - before.download;
+        const DeviceTimes& device = theirs.run.device;
         // a run that reaches its time limit has fewer steps
         const auto steps = std::min(ours.run.kineticEnergy.size(), theirs.run.kineticEnergy.size());
         const auto usual = [&](const Row& row) {
@@ -282,7 +279,7 @@ void compareDevice(const Options& options) {
         for (std::size_t i = 0; i < steps; ++i) differing += ours.run.kineticEnergy[i] != theirs.run.kineticEnergy[i];
         const double each = 1e3 / double(theirs.run.stepMs.size());
         fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {} |\n", bodies, usual(ours), usual(theirs),
-                   each * kernels, each * transfers, differing);
+                   each * device.kernels, each * (device.upload + device.download), differing);
         std::fflush(stdout);
     }
 }

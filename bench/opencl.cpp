@@ -50,7 +50,7 @@ struct Engine {
     BlockFiller filler;
 
     // A builder with times of its own.
-    OpenclFiller profiled() const { return openclFiller(device, {.memoryMiB = memoryMiB, .profile = true}); }
+    BlockFiller profiled() const { return openclFiller(device, {.memoryMiB = memoryMiB, .profile = true}); }
 };
 
 Engine openEngine(const std::string& name, std::uint64_t memoryMiB) {
@@ -95,7 +95,7 @@ struct Row {
     double ratio = 1;
     std::uint64_t activeVoxels = 0;
     Difference difference{};
-    OpenclTimes onDevice{};
+    DeviceTimes onDevice{};
 
     bool held() const { return engine && contest->same; }
     bool differs() const {
@@ -145,16 +145,15 @@ void measureTime(const Scene& scene, std::vector<Row>& rows, const Options& opti
 void profile(const Scene& scene, std::vector<Row>& rows) {
     for (Row& row : rows) {
         if (!row.engine) continue;
-        std::vector<OpenclTimes> runs;
+        std::vector<DeviceTimes> runs;
         Job job = row.job;
         while (runs.size() < profiledRuns) {
-            const OpenclFiller filler = row.engine->profiled();
+            const BlockFiller filler = row.engine->profiled();
             job.filler = &filler;
-            run(scene, job);
-            runs.push_back(filler.times());
+            runs.push_back(fieldOf(scene, job).buildTimes().device);
         }
         std::sort(runs.begin(), runs.end(),
-                  [](const OpenclTimes& a, const OpenclTimes& b) { return a.kernels < b.kernels; });
+                  [](const DeviceTimes& a, const DeviceTimes& b) { return a.kernels < b.kernels; });
         row.onDevice = runs[runs.size() / 2];
     }
 }
@@ -196,7 +195,7 @@ void printRow(const Row& row, const std::vector<Engine>& engines) {
     const auto onDevice = [&](double value, int digits) {
         return row.engine ? fmt::format("{:.{}f}", value, digits) : "-";
     };
-    const OpenclTimes& t = row.onDevice;
+    const DeviceTimes& t = row.onDevice;
     fmt::print(columns, row.mesh, row.voxels, row.engine ? row.contest->method : nameOf(row.job.builder),
                row.job.halfWidth, placeOf(row, engines), fmt::format("{:.1f}", median(row.seconds) * 1e3),
                onDevice(row.ratio, 2), onDevice(t.kernels * 1e3, 2), onDevice(t.upload * 1e3, 2),

@@ -8,6 +8,7 @@
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <oneapi/tbb/parallel_for.h>
 
+#include <bilayer/integration/bullet/dispatcher.h>
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -108,6 +109,10 @@ class Arena {
 
     void step(float seconds) { world_.stepSimulation(seconds, 1, seconds); }
     StepParts takeParts() { return world_.takeParts(); }
+    DeviceTimes deviceTimes() const {
+        const auto* fields = dynamic_cast<const bullet::Dispatcher*>(dispatcher_.get());
+        return fields ? fields->statistics().device : DeviceTimes{};
+    }
 
     std::vector<Pose> poses() const {
         std::vector<Pose> all;
@@ -188,6 +193,7 @@ PileRun play(const Rival& rival, const std::vector<Member>& members, const PileO
         run.stepMs.push_back(1e3 * watch.seconds());
         run.parts.push_back(arena.takeParts());
         run.kineticEnergy.push_back(arena.kineticEnergy());
+        run.device += arena.deviceTimes();
         if (i % between == 0) frames.push_back(arena.poses());
     }
     run.simulated = double(run.stepMs.size()) / double(options.stepsPerSecond);

@@ -7,6 +7,7 @@
 
 #include <bilayer/collider/mass.h>
 #include <bilayer/collider/pose.h>
+#include <bilayer/sdf/level_set.h>
 #include "bench/rivals.h"
 #include "demos/shared/exact_distance.h"
 
@@ -53,6 +54,7 @@ struct PileRun {
     std::vector<double> penetrations;   ///< overlapping pairs in the measured frames, by the meshes [m]
     int awakeBodies = 0;                ///< bodies at the end that are too fast to fall asleep
     double simulated = 0;               ///< [s]
+    DeviceTimes device;                 ///< of all steps, if a device samples the points
 };
 
 /// Lets the bodies fall. Sleeping is disabled, so each step does its full work.

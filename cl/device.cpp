@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "cl/detail/program.h"
+#include "sdf/base/access.h"
 
 namespace bilayer {
 
@@ -89,7 +90,7 @@ FoundDevice choose(const std::string& text) {
 }  // namespace
 
 const DeviceInfo& Device::info() const {
-    return impl_->info;
+    return data_->info;
 }
 
 std::vector<DeviceInfo> devices() {
@@ -110,7 +111,7 @@ Device openDevice(const std::string& text) {
     } catch (const cl::Error& error) {
         throw deviceError(error, found.info.name);
     }
-    return Device(std::move(impl));
+    return makeOf<Device>(std::move(impl));
 }
 
 }  // namespace bilayer

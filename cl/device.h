@@ -12,8 +12,9 @@
 namespace bilayer {
 
 namespace detail {
+struct Access;
 struct DeviceImpl;
-}
+}  // namespace detail
 
 /// Error of a device. The text names the call, the code and the device, and holds the build log if a kernel failed to
 /// build.
@@ -41,14 +42,13 @@ struct DeviceInfo {
 /// builds. Copies share them. Several threads may use it at once; each build takes device memory of its own.
 class Device {
   public:
-    /// From its data; for internal use.
-    explicit Device(std::shared_ptr<detail::DeviceImpl> impl) : impl_(std::move(impl)) {}
     const DeviceInfo& info() const;  ///< What it is and can do. Valid as long as a copy of the device lives.
-    /// The data of the device; for internal use.
-    detail::DeviceImpl& impl() const { return *impl_; }
 
   private:
-    std::shared_ptr<detail::DeviceImpl> impl_;
+    friend struct detail::Access;
+    explicit Device(std::shared_ptr<detail::DeviceImpl> data) : data_(std::move(data)) {}
+
+    std::shared_ptr<detail::DeviceImpl> data_;
 };
 
 /// All devices of all platforms that can compile kernels, GPUs first. Empty if there is no such device, or no platform.

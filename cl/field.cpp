@@ -19,6 +19,7 @@
 #include "cl/detail/timing.h"
 #include "collider/field/layout/batch.h"
 #include "collider/field/layout/field_layout.h"
+#include "sdf/base/access.h"
 
 namespace bilayer {
 
@@ -47,7 +48,7 @@ struct PointBatch {
 
 cl::Program samplingProgram(const Device& device) {
     requireDoubles(device.info(), "which samples of fields need");
-    return buildProgram(device.impl(), field_cl, commonBuildOptions(device.impl()));
+    return buildProgram(dataOf(device), field_cl, commonBuildOptions(dataOf(device)));
 }
 
 }  // namespace
@@ -62,7 +63,7 @@ struct DeviceField::Data {
     std::array<PointBatch, batchesInFlight> batches;
     std::mutex mutex;  // guards `batches`
     const bool profile;
-    OpenclTimes buildTimes;
+    DeviceTimes buildTimes;
 
     Data(const Device& device, const OpenclOptions& options, std::uint64_t budget);
 
@@ -73,11 +74,11 @@ struct DeviceField::Data {
 
 DeviceField::Data::Data(const Device& device, const OpenclOptions& options, std::uint64_t budget)
     : device(device),
-      gpuMapping(wantsGroups(device.impl(), options.mapping)),
-      memory(device.impl(), budget),
+      gpuMapping(wantsGroups(dataOf(device), options.mapping)),
+      memory(dataOf(device), budget),
       program(samplingProgram(device)),
       profile(options.profile) {
-    const DeviceImpl& impl = device.impl();
+    const DeviceImpl& impl = dataOf(device);
     for (PointBatch& batch : batches) {
         batch.queue = cl::CommandQueue(impl.context, impl.device, CL_QUEUE_PROFILING_ENABLE);
         if (impl.info.unifiedMemory) continue;
@@ -88,13 +89,13 @@ DeviceField::Data::Data(const Device& device, const OpenclOptions& options, std:
 
 void DeviceField::Data::upload(FieldLayout from) {
     Timing timing(profile);
-    const QueueGuard guard(device.impl().queue);
+    const QueueGuard guard(dataOf(device).queue);
     const auto uploaded = [&](const auto* data, std::size_t count) {
         return memory.upload(data, count * sizeof *data, "the field", timing.event(Timing::Command::upload));
     };
     layout = {from, uploaded(from.directory.data(), from.directory.size()),
               uploaded(from.centres.data(), from.centres.size()), uploaded(from.values.data(), from.values.size())};
-    device.impl().queue.finish();
+    dataOf(device).queue.finish();
     buildTimes = timing.total(memory.peak());
     if (device.info().unifiedMemory) shared = std::move(from);
 }
@@ -106,17 +107,17 @@ void DeviceField::Data::start(PointBatch& batch, std::span<const glm::vec3> poin
     const bool unified = device.info().unifiedMemory;
     if (unified) {
         // OpenCL's signature takes a pointer to mutable data; it is only read
-        batch.points = cl::Buffer(device.impl().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, points.size_bytes(),
+        batch.points = cl::Buffer(dataOf(device).context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, points.size_bytes(),
                                   const_cast<glm::vec3*>(points.data()));
-        batch.samples = cl::Buffer(device.impl().context, CL_MEM_WRITE_ONLY | CL_MEM_USE_HOST_PTR, samples.size_bytes(),
-                                   samples.data());
+        batch.samples = cl::Buffer(dataOf(device).context, CL_MEM_WRITE_ONLY | CL_MEM_USE_HOST_PTR,
+                                   samples.size_bytes(), samples.data());
     } else {
         queue.enqueueWriteBuffer(batch.points, CL_FALSE, 0, points.size_bytes(), points.data(), nullptr,
                                  timing.event(Timing::Command::upload));
     }
     const std::size_t each = gpuMapping ? 1 : pointsPerProcessorItem, local = gpuMapping ? groupItems : 1;
     const std::size_t items = (points.size() + each - 1) / each, global = (items + local - 1) / local * local;
-    enqueueKernel(device.impl(), queue, program, "sampleField", cl::NDRange(global), cl::NDRange(local),
+    enqueueKernel(dataOf(device), queue, program, "sampleField", cl::NDRange(global), cl::NDRange(local),
                   timing.event(Timing::Command::kernel), KernelFrame(layout.frame), layout.directory, layout.centres,
                   layout.values, batch.points, cl_uint(points.size()), cl_uint(each), batch.samples);
     cl::Event* const download = timing.event(Timing::Command::download);
@@ -143,7 +144,7 @@ void DeviceField::Data::sample(std::span<const glm::vec3> points, std::span<Samp
 }
 
 DeviceField::DeviceField(const Device& device, const LevelSet& levelSet, const OpenclOptions& options) try {
-    data_ = std::make_shared<Data>(device, options, memoryBudget(device.impl(), options.memoryMiB));
+    data_ = std::make_shared<Data>(device, options, memoryBudget(dataOf(device), options.memoryMiB));
     data_->upload(FieldLayout(levelSet));
 } catch (const cl::Error& error) {
     throw deviceError(error, device.info().name);
@@ -151,7 +152,7 @@ DeviceField::DeviceField(const Device& device, const LevelSet& levelSet, const O
 
 DeviceField::DeviceField(const Device& device, const Mesh& mesh, const BuildOptions& build,
                          const OpenclOptions& options) try {
-    const std::uint64_t budget = memoryBudget(device.impl(), options.memoryMiB);
+    const std::uint64_t budget = memoryBudget(dataOf(device), options.memoryMiB);
     data_ = std::make_shared<Data>(device, options, budget - budget / fillPart);
     BuiltDeviceField field = buildDeviceField(device, mesh, build, options, data_->memory);
     data_->layout = std::move(field.layout);
@@ -160,7 +161,7 @@ DeviceField::DeviceField(const Device& device, const Mesh& mesh, const BuildOpti
     throw deviceError(error, device.info().name);
 }
 
-OpenclTimes DeviceField::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
+DeviceTimes DeviceField::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
     requireSameLength(points.size(), "points", samples.size(), "samples");
     const std::lock_guard lock(data_->mutex);
     Timing timing(data_->profile);
@@ -180,7 +181,7 @@ std::size_t DeviceField::memoryBytes() const {
     return data_->memory.used();
 }
 
-const OpenclTimes& DeviceField::buildTimes() const {
+const DeviceTimes& DeviceField::buildTimes() const {
     return data_->buildTimes;
 }
 

@@ -45,20 +45,15 @@ class DeviceField {
     /// @return the times of the call, measured if OpenclOptions::profile was set
     ///
     /// Throws std::invalid_argument if `samples` is not as long as `points`, and DeviceError for errors of the device.
-    OpenclTimes sample(std::span<const glm::vec3> points, std::span<Sample> samples) const;
+    DeviceTimes sample(std::span<const glm::vec3> points, std::span<Sample> samples) const;
 
     const Bounds& bounds() const;           ///< around all points in the band [m]
     std::size_t memoryBytes() const;        ///< on the device, including the buffers for points in flight
-    const OpenclTimes& buildTimes() const;  ///< of the constructor: of the upload, or of the build
+    const DeviceTimes& buildTimes() const;  ///< of the constructor: of the upload, or of the build
 
   private:
     struct Data;
     std::shared_ptr<Data> data_;
-};
-
-/// A point sampler on a device, with its times.
-struct OpenclPointSampler : PointSampler {
-    std::function<OpenclTimes()> times;  ///< of all batches so far by this sampler and its copies
 };
 
 /// A point sampler on a device. Bodies are uploaded on first use, and stay. If the memory is full, all bodies are
@@ -67,6 +62,6 @@ struct OpenclPointSampler : PointSampler {
 ///
 /// Throws DeviceError, here and when it samples: for errors of the device, for a device without double precision, and
 /// if the memory is too small for the bodies of one batch. The text then states how many MiB are needed.
-OpenclPointSampler openclPointSampler(const Device& device, const OpenclOptions& options = {});
+PointSampler openclPointSampler(const Device& device, const OpenclOptions& options = {});
 
 }  // namespace bilayer

@@ -1,29 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <bilayer/cl/filler.h>
 
-#include <memory>
-
 #include "cl/detail/brick_filler.h"
 #include "cl/detail/prism.h"
 #include "cl/detail/program.h"
-#include "cl/detail/timing.h"
+#include "sdf/base/access.h"
 #include "sdf/leaf/blocks.h"
 
 namespace bilayer {
 
 using namespace detail;
 
-OpenclFiller openclFiller(const Device& device, const OpenclOptions& options) {
-    const auto sum = std::make_shared<TimesSum>();
-    const auto fill = [device, options, sum](const FillJob& job) {
+BlockFiller openclFiller(const Device& device, const OpenclOptions& options) {
+    const auto fill = [device, options](const FillJob& job) {
         try {
-            sum->add(job.options.method == Method::prism ? fillPrism(device.impl(), options, job)
-                                                         : fillByBricks(device.impl(), options, job));
+            return job.options.method == Method::prism ? fillPrism(dataOf(device), options, job)
+                                                       : fillByBricks(dataOf(device), options, job);
         } catch (const cl::Error& error) {
             throw deviceError(error, device.info().name);
         }
     };
-    return {BlockFiller({"opencl", device.info().name, fill}), [sum] { return sum->get(); }};
+    return makeOf<BlockFiller>(DeviceFiller{"opencl", device.info().name, fill});
 }
 
 }  // namespace bilayer

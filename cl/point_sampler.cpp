@@ -20,6 +20,7 @@
 #include "cl/detail/queue_guard.h"
 #include "cl/detail/timing.h"
 #include "collider/contact/search/sampled_points.h"
+#include "sdf/base/access.h"
 
 namespace bilayer {
 
@@ -113,7 +114,7 @@ class GrowingBuffer {
 
 cl::Program samplerProgram(const Device& device) {
     requireDoubles(device.info(), "which samples of fields need");
-    return buildProgram(device.impl(), point_sampler_cl, commonBuildOptions(device.impl()));
+    return buildProgram(dataOf(device), point_sampler_cl, commonBuildOptions(dataOf(device)));
 }
 
 class Sampler {
@@ -121,12 +122,12 @@ class Sampler {
     Sampler(const Device& device, const OpenclOptions& options)
         : device_(device),
           profile_(options.profile),
-          gpuMapping_(wantsGroups(device.impl(), options.mapping)),
-          memory_(device.impl(), memoryBudget(device.impl(), options.memoryMiB)),
+          gpuMapping_(wantsGroups(dataOf(device), options.mapping)),
+          memory_(dataOf(device), memoryBudget(dataOf(device), options.memoryMiB)),
           program_(samplerProgram(device)),
-          queue_(device.impl().context, device.impl().device, CL_QUEUE_PROFILING_ENABLE) {}
+          queue_(dataOf(device).context, dataOf(device).device, CL_QUEUE_PROFILING_ENABLE) {}
 
-    OpenclTimes sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers);
+    void sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers);
 
   private:
     // The location of a body in the buffers.
@@ -213,7 +214,7 @@ std::vector<KernelFound> Sampler::run(const std::vector<KernelBody>& bodies, con
     do {
         answers_.reserve(capacity_ * sizeof(KernelFound), queue_, memory_);
         queue_.enqueueFillBuffer(count_.buffer(), none, 0, sizeof none);
-        enqueueKernel(device_.impl(), queue_, program_, "samplePoints", cl::NDRange(global), cl::NDRange(local),
+        enqueueKernel(dataOf(device_), queue_, program_, "samplePoints", cl::NDRange(global), cl::NDRange(local),
                       timing.event(Timing::Command::kernel), bodies_.buffer(), queries_.buffer(),
                       cl_uint(queries.size()), balls, cl_uint(each), directories_.buffer(), centres_.buffer(),
                       values_.buffer(), points_.buffer(), balls_.buffer(), cl_uint(capacity_), count_.buffer(),
@@ -244,16 +245,14 @@ std::vector<KernelFound> Sampler::answer(std::span<const SampledBody> bodies, st
 }
 
 // The device returns answers in any order.
-OpenclTimes Sampler::sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
-                            FoundPoints& answers) {
+void Sampler::sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers) {
     std::vector<KernelFound> all;
-    OpenclTimes times;
     try {
         Timing timing(profile_);
         if (std::exchange(failed_, true)) releaseBodies();
         all = answer(bodies, queries, timing);
         failed_ = false;
-        times = timing.total(memory_.peak());
+        answers.times = timing.total(memory_.peak());
     } catch (const cl::Error& error) {
         throw deviceError(error, device_.info().name);
     }
@@ -269,21 +268,19 @@ OpenclTimes Sampler::sample(std::span<const SampledBody> bodies, std::span<const
         answers.points.push_back({each.point, {each.distance, {x, y, z}, each.inBand != 0}});
     }
     for (std::size_t q = 0; q < queries.size(); ++q) answers.begins[q + 1] += answers.begins[q];
-    return times;
 }
 
 }  // namespace
 
-OpenclPointSampler openclPointSampler(const Device& device, const OpenclOptions& options) try {
+PointSampler openclPointSampler(const Device& device, const OpenclOptions& options) try {
     const auto sampler = std::make_shared<Sampler>(device, options);
     const auto mutex = std::make_shared<std::mutex>();
-    const auto sum = std::make_shared<TimesSum>();
     const auto sample = [=](std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
                             FoundPoints& answers) {
         const std::lock_guard lock(*mutex);
-        sum->add(sampler->sample(bodies, queries, answers));
+        sampler->sample(bodies, queries, answers);
     };
-    return {PointSampler({"opencl", device.info().name, sample}), [sum] { return sum->get(); }};
+    return makeOf<PointSampler>(DeviceSampler{"opencl", device.info().name, sample});
 } catch (const cl::Error& error) {
     throw deviceError(error, device.info().name);
 }

@@ -13,8 +13,9 @@
 namespace bilayer {
 
 namespace detail {
+struct Access;
 struct ColliderData;
-}
+}  // namespace detail
 
 /// The source of contact distances and normals. Field samples find the candidates first.
 enum class ContactAccuracy {
@@ -70,10 +71,10 @@ class Collider {
     /// stored with the body. Throws std::invalid_argument if there is no volume.
     const MassProperties& mass() const;
     std::uint64_t id() const;  ///< unique within this process
-    /// The contact data; for internal use.
-    const detail::ColliderData& data() const { return *data_; }
 
   private:
+    friend struct detail::Access;
+
     std::shared_ptr<const detail::ColliderData> data_;
 };
 

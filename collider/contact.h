@@ -17,6 +17,7 @@
 namespace bilayer {
 
 namespace detail {
+struct Access;
 struct ContactMemory;
 struct DeviceSampler;
 }  // namespace detail
@@ -120,10 +121,9 @@ class ContactCache {
     /// The same, in place of its own data.
     ContactCache& operator=(ContactCache&&) noexcept;
 
-    /// The data; for internal use.
-    detail::ContactMemory& data() { return *data_; }
-
   private:
+    friend struct detail::Access;
+
     std::unique_ptr<detail::ContactMemory> data_;
 };
 
@@ -153,18 +153,16 @@ ContactReport collide(const PlacedShape& a, const PlacedShape& b, const ContactO
 class PointSampler {
   public:
     PointSampler() = default;  ///< no sampler
-    /// For internal use; openclPointSampler() makes a sampler.
-    explicit PointSampler(detail::DeviceSampler sampler);
 
     /// Whether there is a sampler.
     explicit operator bool() const { return data_ != nullptr; }
     const std::string& backend() const;  ///< "opencl"; requires a sampler
     const std::string& device() const;   ///< the device's name; requires a sampler
 
-    /// The data; for internal use.
-    const detail::DeviceSampler& data() const { return *data_; }
-
   private:
+    friend struct detail::Access;
+    explicit PointSampler(detail::DeviceSampler sampler);
+
     std::shared_ptr<const detail::DeviceSampler> data_;
 };
 

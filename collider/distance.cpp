@@ -11,6 +11,7 @@
 #include "collider/contact/distance/mesh_distance.h"
 #include "collider/contact/shapes/placed_shapes.h"
 #include "collider/field/samples/field_data.h"
+#include "sdf/base/access.h"
 
 namespace bilayer {
 
@@ -58,7 +59,7 @@ BodyDistance separated(const Bodies& bodies, const MeshDistance& found) {
 bool isInside(const Bodies& bodies) {
     const Collider& outer = bodies.b.collider;
     const Bounds& bounds = outer.bounds();
-    const auto components = bodies.a.collider.data().componentPoints();
+    const auto components = dataOf(bodies.a.collider).componentPoints();
     return std::any_of(components.begin(), components.end(), [&](const glm::vec3& point) {
         const glm::vec3 at(bodies.aToB(glm::dvec3(point)));
         return at == glm::clamp(at, bounds.lower, bounds.upper) && outer.exactField().inside(at);
@@ -76,7 +77,7 @@ struct Depth {
 Depth deepestSample(const Bodies& bodies) {
     const Field& field = bodies.b.collider.exactField();
     Depth deepest;
-    for (const SurfacePoint& point : bodies.a.collider.data().points().points()) {
+    for (const SurfacePoint& point : dataOf(bodies.a.collider).points().points()) {
         const glm::vec3 at(bodies.aToB(glm::dvec3(point.position)));
         const Sample sample = field.sample(at);
         const bool shallow = sample.inBand && sample.distance > deepest.closest.distance + field.voxelSize();
@@ -144,7 +145,7 @@ BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& o
     const Bodies bodies{a, b, toWorld(a).into(toWorld(b))};
     const double limit = searchLimit(options, lengthOf(bodies)) / double(b.scale);
     const MeshDistance found =
-        distanceBetween(a.collider.data().meshTree(), b.collider.data().meshTree(), bodies.aToB, limit,
+        distanceBetween(dataOf(a.collider).meshTree(), dataOf(b.collider).meshTree(), bodies.aToB, limit,
                         start ? TriangleIndices{start->triangleA, start->triangleB} : TriangleIndices{});
     if (start) *start = {found.triangleA, found.triangleB};
     if (found.found() && found.distance == 0) return intersecting(bodies, found);

@@ -22,6 +22,7 @@ namespace bilayer {
 
 namespace detail {
 
+struct Access;
 struct FieldData;
 class TiledFieldData;
 
@@ -64,9 +65,6 @@ class Field {
     /// searches. Also throws std::invalid_argument if the level set belongs to another mesh, or if the mesh is invalid.
     /// Triangles that build() flipped are flipped in mesh() too.
     Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options = {});
-
-    /// From shared data; for internal use.
-    explicit Field(std::shared_ptr<const detail::FieldData> data);
 
     /// Distance and gradient at a point in field coordinates [m].
     Sample sample(const glm::vec3& point) const noexcept { return sample_(*data_, point); }
@@ -163,11 +161,12 @@ class Field {
     const Bounds& bounds() const noexcept;  ///< of all points in the band [m]
     /// Null if the field has no mesh. Valid as long as the field or a copy of it lives.
     const Mesh* mesh() const noexcept;
-    /// The query data; for internal use. Valid as long as the field or a copy of it lives.
-    const detail::FieldData& data() const noexcept { return *data_; }
     std::size_t memoryBytes() const noexcept;  ///< of all that its queries use, the mesh included [bytes]
 
   private:
+    friend struct detail::Access;
+    explicit Field(std::shared_ptr<const detail::FieldData> data);
+
     std::shared_ptr<const detail::FieldData> data_;
     Sample (*sample_)(const detail::FieldData&, const glm::vec3&) noexcept;  // the fastest for this processor
 };

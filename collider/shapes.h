@@ -15,8 +15,9 @@
 namespace bilayer {
 
 namespace detail {
+struct Access;
 struct ContactShapeData;
-}
+}  // namespace detail
 
 /// The corners of a triangle [m].
 using Triangle = std::array<glm::vec3, 3>;
@@ -72,12 +73,10 @@ class ContactShape {
     /// The collider, if the shape was made of one; null otherwise.
     const Collider* collider() const;
 
-    /// For internal use; the functions above make shapes.
-    explicit ContactShape(detail::ContactShapeData data);
-    /// The data; for internal use.
-    const detail::ContactShapeData& data() const { return *data_; }
-
   private:
+    friend struct detail::Access;
+    explicit ContactShape(detail::ContactShapeData data);
+
     std::shared_ptr<const detail::ContactShapeData> data_;
 };
 

@@ -18,6 +18,7 @@
 #include "collider/contact/impact/penetration.h"
 #include "collider/contact/shapes/placed_shapes.h"
 #include "collider/contact/shapes/shape_data.h"
+#include "sdf/base/access.h"
 #include "sdf/base/finite.h"
 
 namespace bilayer {
@@ -65,7 +66,7 @@ Extent extentOf(const Convex& convex, double scale) {
 }
 
 Extent extentOf(const PlacedShape& body, const std::string& motion) {
-    const auto& shape = body.shape.data().shape;
+    const auto& shape = dataOf(body.shape).shape;
     if (body.shape.collider()) return extentOf(placed(body));
     if (const auto* convex = std::get_if<Convex>(&shape)) return extentOf(*convex, double(body.scale));
     if (body.motion.rotation != glm::vec3(0))

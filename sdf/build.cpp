@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sdf/base/access.h"
 #include "sdf/grid/field_build.h"
 #include "sdf/leaf/blocks.h"
 
@@ -25,7 +26,7 @@ const std::string& BlockFiller::device() const {
 }
 
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler) {
-    return detail::buildField(mesh, options, filler ? &filler->data() : nullptr);
+    return detail::buildField(mesh, options, filler ? &detail::dataOf(*filler) : nullptr);
 }
 
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler) {

@@ -18,23 +18,21 @@
 namespace bilayer {
 
 namespace detail {
+struct Access;
 struct DeviceFiller;
-}
+}  // namespace detail
 
 /// A device that fills the blocks of a field. openclFiller() in cl/filler.h makes one; build() uses the CPU by default.
 /// Cheap to copy.
 class BlockFiller {
   public:
-    /// For internal use; openclFiller() makes a filler.
-    explicit BlockFiller(detail::DeviceFiller filler);
-
     const std::string& backend() const;  ///< "opencl"
     const std::string& device() const;   ///< the device's name
 
-    /// The data; for internal use.
-    const detail::DeviceFiller& data() const { return *data_; }
-
   private:
+    friend struct detail::Access;
+    explicit BlockFiller(detail::DeviceFiller filler);
+
     std::shared_ptr<const detail::DeviceFiller> data_;
 };
 

@@ -3,6 +3,7 @@
 // Tested by tests/sdf/build.cpp.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -13,6 +14,24 @@ namespace bilayer {
 
 struct Grids;
 
+/// What work on a device took: times by the events of its queues, and memory. Times are 0 unless they were asked for
+/// (OpenclOptions::profile).
+struct DeviceTimes {
+    double kernels = 0;           ///< overlapping kernels count once [s]
+    double upload = 0;            ///< to the device; 0 if it shares the host's memory [s]
+    double download = 0;          ///< from the device [s]
+    std::uint64_t peakBytes = 0;  ///< peak device memory [bytes]
+
+    /// Adds the times of other work. The peak is the larger one.
+    DeviceTimes& operator+=(const DeviceTimes& other) {
+        kernels += other.kernels;
+        upload += other.upload;
+        download += other.download;
+        peakBytes = std::max(peakBytes, other.peakBytes);
+        return *this;
+    }
+};
+
 /// Times of the phases of a build [s], and the count of blocks that it filled.
 struct BuildTimes {
     double prepare = 0;   ///< choosing the sign method, uniting solids, finding what an update must fill
@@ -22,6 +41,7 @@ struct BuildTimes {
     /// Blocks of 8x8x8 voxels whose distances were computed. A block counts again for each sign method that is tried.
     /// rebuild() copies all other blocks.
     std::size_t filledBlocks = 0;
+    DeviceTimes device{};  ///< of a build by a device
 };
 
 /// An immutable narrow-band signed distance field, cheap to copy and safe to share between threads. Distances are

@@ -24,10 +24,10 @@ json profiled(const Engine& engine, const Scene& scene, Builder builder, int rou
     std::vector<double> kernels;
     std::uint64_t peak = 0;
     for (int round = 0; round < rounds; ++round) {
-        const OpenclFiller filler = openclFiller(engine.device, {.profile = true});
-        bench::run(scene, {builder, halfWidth, threads, &filler});
-        kernels.push_back(filler.times().kernels);
-        peak = std::max(peak, filler.times().peakBytes);
+        const BlockFiller filler = openclFiller(engine.device, {.profile = true});
+        const DeviceTimes times = bench::fieldOf(scene, {builder, halfWidth, threads, &filler}).buildTimes().device;
+        kernels.push_back(times.kernels);
+        peak = std::max(peak, times.peakBytes);
     }
     return {{"kernels", bench::median(kernels)}, {"peak", peak}};
 }

@@ -67,7 +67,7 @@ struct BrickBatch {
 class BrickFill {
   public:
     BrickFill(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep);
-    OpenclTimes run();
+    DeviceTimes run();
 
   private:
     void makeScratch();
@@ -271,7 +271,7 @@ void BrickFill::passToHost(BrickBatch& batch, std::size_t blocks) {
     batch.results.reset();
 }
 
-OpenclTimes BrickFill::run() {
+DeviceTimes BrickFill::run() {
     std::size_t next = 0;
     for (const BatchPlan::Range& bricks : plan_->ranges()) {
         BrickBatch& batch = batches_[next++ % batchesInFlight];
@@ -279,14 +279,14 @@ OpenclTimes BrickFill::run() {
         start(batch, bricks);
     }
     for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[next++ % batchesInFlight]);
-    const OpenclTimes times = timing_.total(memory_.peak());
+    const DeviceTimes times = timing_.total(memory_.peak());
     if (!open_.empty()) fillOnHost(job_, std::move(open_));
     return times;
 }
 
 }  // namespace
 
-OpenclTimes fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep) {
+DeviceTimes fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep) {
     requireDoubles(device.info, "which exact and double-layer need; prism does not");
     return BrickFill(device, options, job, keep).run();
 }

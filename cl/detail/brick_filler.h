@@ -19,7 +19,7 @@ using DeviceSink = std::function<void(const cl::Buffer& origins, const cl::Buffe
 /// Fills all blocks of a job by Method::exact or Method::doubleLayer.
 /// @param keep  if not null, gets the blocks that the device filled; the job's sink gets all others
 /// @return the times of the fill
-OpenclTimes fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job,
+DeviceTimes fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job,
                          const DeviceSink& keep = {});
 
 }  // namespace bilayer::detail

@@ -15,6 +15,7 @@
 #include "cl/detail/enqueue.h"
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/queue_guard.h"
+#include "sdf/base/access.h"
 #include "sdf/grid/field_build.h"
 #include "sdf/leaf/band.h"
 #include "sdf/leaf/blocks.h"
@@ -115,7 +116,7 @@ class DeviceFieldBuilder {
 
 DeviceFieldBuilder::DeviceFieldBuilder(const Device& device, const OpenclOptions& options, DeviceMemory& memory,
                                        const FillJob& job)
-    : device_(device.impl()),
+    : device_(dataOf(device)),
       options_(options),
       memory_(memory),
       job_(job),
@@ -135,7 +136,7 @@ BuiltDeviceField DeviceFieldBuilder::run() {
         hostOrigins_.insert(hostOrigins_.end(), blocks.origins.begin(), blocks.origins.end());
         hostDistances_.insert(hostDistances_.end(), blocks.distances.begin(), blocks.distances.end());
     };
-    OpenclTimes times = fillByBricks(device_, options_, {mesh, job_.options, job_.box, job_.layers},
+    DeviceTimes times = fillByBricks(device_, options_, {mesh, job_.options, job_.box, job_.layers},
                                      [&](const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
                                          addPage(origins, distances, blocks);
                                      });
@@ -263,21 +264,22 @@ BuiltDeviceField buildDeviceField(const Device& device, const Mesh& mesh, const 
                                   const OpenclOptions& options, DeviceMemory& memory) {
     OpenclOptions fillOptions = options;
     fillOptions.memoryMiB =
-        std::max<std::uint64_t>(1, memoryBudget(device.impl(), options.memoryMiB) / fillPart / mebibyte);
+        std::max<std::uint64_t>(1, memoryBudget(dataOf(device), options.memoryMiB) / fillPart / mebibyte);
     BuildOptions withoutTriangles = build;
     withoutTriangles.triangles = false;
 
     DeviceLayout layout;
-    OpenclTimes times;
-    fillOnly(mesh, withoutTriangles,
-             {"opencl", device.info().name, [&](const FillJob& job) {
-                  checkJob(job);
-                  // the first fill had contradictory signs
-                  for (cl::Buffer* buffer : {&layout.directory, &layout.centres, &layout.values}) memory.free(*buffer);
-                  BuiltDeviceField field = DeviceFieldBuilder(device, fillOptions, memory, job).run();
-                  layout = std::move(field.layout);
-                  times += field.times;
-              }});
+    DeviceTimes times = fillOnly(mesh, withoutTriangles,
+                                 {"opencl", device.info().name, [&](const FillJob& job) {
+                                      checkJob(job);
+                                      // the first fill had contradictory signs
+                                      for (cl::Buffer* buffer : {&layout.directory, &layout.centres, &layout.values})
+                                          memory.free(*buffer);
+                                      BuiltDeviceField field =
+                                          DeviceFieldBuilder(device, fillOptions, memory, job).run();
+                                      layout = std::move(field.layout);
+                                      return field.times;
+                                  }});
     times.peakBytes += memory.peak();
     return {std::move(layout), times};
 }

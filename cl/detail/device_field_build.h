@@ -37,7 +37,7 @@ inline constexpr std::uint64_t fillPart = 4;
 /// A field in a device's memory, and the times of its build.
 struct BuiltDeviceField {
     DeviceLayout layout;
-    OpenclTimes times;
+    DeviceTimes times;
 };
 
 /// Builds the field of a mesh on a device. Only the mesh is uploaded, and only counts are downloaded. The layout's

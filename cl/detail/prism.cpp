@@ -74,7 +74,7 @@ class PrismFill {
   public:
     PrismFill(DeviceImpl& device, const OpenclOptions& options, const PrismJob& job, const MeshJob& mesh,
               const TriangleBins& bins);
-    OpenclTimes run();
+    DeviceTimes run();
 
   private:
     void prepare(std::size_t first, std::size_t last);
@@ -118,7 +118,7 @@ PrismFill::PrismFill(DeviceImpl& device, const OpenclOptions& options, const Pri
       fillGuard_(device.queue),
       uploadGuard_(uploads_) {}
 
-OpenclTimes PrismFill::run() {
+DeviceTimes PrismFill::run() {
     std::size_t next = 0;
     for (std::size_t first = 0; first < bins_.count(); first += windowBricks) {
         const std::size_t last = std::min(first + windowBricks, bins_.count());
@@ -281,7 +281,7 @@ void PrismFill::finish(PrismBatch& batch) {
 
 }  // namespace
 
-OpenclTimes fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job) {
+DeviceTimes fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job) {
     const MeshJob& mesh = job.input;
     const double voxelsPerUnit = 1.0 / double(mesh.voxelSize);
     const VerticesAcross across(mesh.mesh, mesh.progress);

@@ -13,6 +13,6 @@ namespace bilayer::detail {
 ///
 /// Throws cl::Error, Cancelled, and DeviceError if the memory is too small for one brick's work; the text then states
 /// how many MiB are needed.
-OpenclTimes fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job);
+DeviceTimes fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job);
 
 }  // namespace bilayer::detail

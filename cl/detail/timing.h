@@ -5,11 +5,10 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <mutex>
 #include <utility>
 #include <vector>
 
-#include <bilayer/cl/filler.h>
+#include <bilayer/sdf/level_set.h>
 #include "cl/detail/program.h"
 
 namespace bilayer::detail {
@@ -33,8 +32,8 @@ class Timing {
     }
 
     /// The sum over all events so far. Overlapping kernels count once. Call it when the commands have ended.
-    OpenclTimes total(std::uint64_t peakBytes) const {
-        OpenclTimes times{.peakBytes = peakBytes};
+    DeviceTimes total(std::uint64_t peakBytes) const {
+        DeviceTimes times{.peakBytes = peakBytes};
         std::vector<std::pair<cl_ulong, cl_ulong>> kernels;
         for (const auto& [command, event] : events_) {
             if (!event()) continue;  // nothing was copied: host and device share the memory
@@ -57,23 +56,6 @@ class Timing {
   private:
     bool profile_;
     std::vector<std::pair<Command, cl::Event>> events_;
-};
-
-/// A sum of times that several threads add to.
-class TimesSum {
-  public:
-    void add(const OpenclTimes& times) {
-        const std::lock_guard lock(mutex_);
-        sum_ += times;
-    }
-    OpenclTimes get() const {
-        const std::lock_guard lock(mutex_);
-        return sum_;
-    }
-
-  private:
-    mutable std::mutex mutex_;
-    OpenclTimes sum_;
 };
 
 }  // namespace bilayer::detail

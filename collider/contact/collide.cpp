@@ -19,6 +19,7 @@
 #include "collider/contact/search/surface_query.h"
 #include "collider/contact/shapes/placed_shapes.h"
 #include "collider/field/samples/field_data.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -101,7 +102,7 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
     };
     // points are fixed to their body, places between them are not
     const auto roundingRadiusOf = [](const Placed& body, std::uint32_t feature) {
-        return feature < body.collider.data().points().points().size() ? 0.f : -1.f;
+        return feature < dataOf(body.collider).points().points().size() ? 0.f : -1.f;
     };
     const auto addOf = [&](const Placed& body, const Placed& other, bool isB) {
         return [&, isB](std::uint32_t index, const SurfacePoint& point, const SurfaceSample& sample) {
@@ -134,8 +135,8 @@ std::optional<PointQuery> pointQuery(const Placed& body, const Placed& other, fl
 SampledBody sampledBody(const Collider& collider) {
     const auto ballsOfPoints = [&collider] {
         BallsOfPoints balls;
-        for (const SurfacePoint& point : collider.data().points().points()) balls.points.push_back(point.position);
-        collider.data().points().tree().forEachLeaf(
+        for (const SurfacePoint& point : dataOf(collider).points().points()) balls.points.push_back(point.position);
+        dataOf(collider).points().tree().forEachLeaf(
             [](const auto&) { return false; },
             [&](const auto& leaf) {
                 balls.balls.push_back({leaf.centre, leaf.radius, leaf.begin, leaf.end});
@@ -143,7 +144,7 @@ SampledBody sampledBody(const Collider& collider) {
             });
         return balls;
     };
-    return {collider.id(), &collider.field().data(), ballsOfPoints};
+    return {collider.id(), &dataOf(collider.field()), ballsOfPoints};
 }
 
 ContactReport collideFound(const Placed& a, const Placed& b, const ContactOptions& options,
@@ -168,7 +169,7 @@ ContactReport collideWithin(ContactRange range, const Placed& a, const Placed& b
             [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };
     };
     const std::size_t first = contacts.size();
-    CandidateLists* lists = cache ? &cache->data().candidates : nullptr;
+    CandidateLists* lists = cache ? &dataOf(*cache).candidates : nullptr;
     const ContactReport report = addContacts(a, b, options, range, contacts, visit(lists ? &lists->ofA : nullptr),
                                              visit(lists ? &lists->ofB : nullptr));
     if (options.exact) refineClosest(std::span(contacts).subspan(first), a, b);

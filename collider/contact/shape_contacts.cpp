@@ -19,6 +19,7 @@
 #include "collider/contact/search/half_space_contacts.h"
 #include "collider/contact/shapes/placed_shapes.h"
 #include "collider/contact/shapes/shape_data.h"
+#include "sdf/base/access.h"
 #include "sdf/base/unit_tolerance.h"
 
 namespace bilayer {
@@ -64,7 +65,7 @@ ContactReport detail::collideShape(const PlacedShape& a, const Placed& b, const 
     options.margin /= units.length;
     const std::size_t first = contacts.size();
     ContactReport report;
-    const auto& shape = a.shape.data().shape;
+    const auto& shape = dataOf(a.shape).shape;
     if (const auto* convex = std::get_if<Convex>(&shape))
         report = collideConvex(*convex, pose, motion, field, options, contacts);
     else if (const auto* solid = std::get_if<HalfSpace>(&shape))

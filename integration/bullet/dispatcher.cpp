@@ -122,6 +122,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     functions_->state.seconds = 0;
     if (!isStep) return;
     functions_->last = functions_->state.running;
+    functions_->last.device = functions_->sampledPairs.times();
     functions_->last.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include <bilayer/collider/contact.h>
+#include <bilayer/sdf/level_set.h>
 
 namespace bilayer::bullet {
 
@@ -20,9 +21,10 @@ struct DispatchStatistics {
     /// Error of the reduction: over all pairs, the maximum depth that a discarded contact could reach before a kept
     /// contact touches [m]
     float reductionError = 0;
-    int beyondBand = 0;  ///< points deeper than the band reaches (see ContactReport)
-    int sampled = 0;     ///< pairs whose points were sampled by the sampler (see Dispatcher)
-    double seconds = 0;  ///< for all of these pairs, including Bullet's own work
+    int beyondBand = 0;    ///< points deeper than the band reaches (see ContactReport)
+    int sampled = 0;       ///< pairs whose points were sampled by the sampler (see Dispatcher)
+    double seconds = 0;    ///< for all of these pairs, including Bullet's own work
+    DeviceTimes device{};  ///< of the sampler
 };
 
 /// Use it in place of btCollisionDispatcher. Fields then collide with every convex shape, planes, triangle meshes,

@@ -11,6 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "integration/bullet/detail/convert.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::bullet {
 
@@ -31,7 +32,7 @@ bool isOutline(bool here, bool neighbourU, bool neighbourV, bool diagonal) {
 // Calls line(from, to) for the edges along one axis [leaves]; collinear edges in a row make one line.
 template <class Line>
 void visitOutline(const Field& field, int axis, Line&& line) {
-    const glm::ivec3 size = field.data().blocks;
+    const glm::ivec3 size = dataOf(field).blocks;
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     glm::ivec3 at(0), unitU(0), unitV(0);
     unitU[u] = unitV[v] = 1;
@@ -39,8 +40,9 @@ void visitOutline(const Field& field, int axis, Line&& line) {
         for (at[v] = 0; at[v] <= size[v]; ++at[v]) {
             glm::ivec3 start(-1);
             for (at[axis] = 0; at[axis] <= size[axis]; ++at[axis]) {
-                const bool outlined = isOutline(field.data().keeps(at), field.data().keeps(at - unitU),
-                                                field.data().keeps(at - unitV), field.data().keeps(at - unitU - unitV));
+                const bool outlined =
+                    isOutline(dataOf(field).keeps(at), dataOf(field).keeps(at - unitU), dataOf(field).keeps(at - unitV),
+                              dataOf(field).keeps(at - unitU - unitV));
                 if (outlined && start[axis] < 0) start = at;
                 if (outlined || start[axis] < 0) continue;
                 line(start, at);
@@ -63,7 +65,7 @@ void drawBand(const Shape& shape, const Placed& here, btIDebugDraw& drawer, cons
 }
 
 void drawPoints(const Shape& shape, const Placed& here, btIDebugDraw& drawer, const DrawOptions& options) {
-    for (const SurfacePoint& point : shape.collider().data().points().points()) {
+    for (const SurfacePoint& point : dataOf(shape.collider()).points().points()) {
         const glm::vec3 from = here.pose.toWorld(here.scale * point.position);
         const glm::vec3 to = from + normalVoxels * shape.voxelSize() * (here.pose.rotation * point.normal);
         drawer.drawLine(toBullet(from), toBullet(to), point.isSharp ? options.sharpColour : options.pointColour);

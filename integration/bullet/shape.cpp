@@ -25,6 +25,7 @@
 #include "integration/bullet/detail/casts.h"
 #include "integration/bullet/detail/convert.h"
 #include "integration/bullet/detail/missing_dispatcher.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::bullet {
 
@@ -307,7 +308,7 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
     noteTriangles(*callback);
     if (auto* ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
         const Placed here = placed(btTransform::getIdentity());
-        if (const MeshTree* mesh = collider_->exactField().data().mesh.get()) return castRay(here, *mesh, *ray);
+        if (const MeshTree* mesh = dataOf(collider_->exactField()).mesh.get()) return castRay(here, *mesh, *ray);
         if (const auto fraction = castRay(here, *ray)) {
             Behind behind(*ray, *fraction);
             triangles_->of(*this).processAllTriangles(&behind, lower, upper);
@@ -319,7 +320,7 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
         sweep->m_triangleCollisionMargin = 0;
         const auto* sphere = dynamic_cast<const btSphereShape*>(sweep->m_convexShape);
         const Placed here = placed(sweep->m_triangleToWorld);
-        if (sphere && castSphere(here, collider_->exactField().data().mesh.get(), sphere->getRadius(), *sweep)) return;
+        if (sphere && castSphere(here, dataOf(collider_->exactField()).mesh.get(), sphere->getRadius(), *sweep)) return;
         return triangles_->cast(*this, *sweep);
     }
 

@@ -90,12 +90,12 @@ void setBand(const Keywords& keywords, BuildOptions& options) {
 
 struct Request {
     BuildOptions options;
-    std::optional<OpenclFiller> filler;
+    std::optional<BlockFiller> filler;
     py::object progress = py::none();
 };
 
 // "cpu", "opencl" for the first device, or "opencl:" with a part of the device's name.
-std::optional<OpenclFiller> fillerOf(const std::string& device) {
+std::optional<BlockFiller> fillerOf(const std::string& device) {
     constexpr std::string_view opencl = "opencl";
     if (device == "cpu") return std::nullopt;
     const bool named = device.starts_with("opencl:");

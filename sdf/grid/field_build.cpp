@@ -99,13 +99,14 @@ LevelSet rebuildField(const LevelSet& old, const Mesh& oldMesh, const Mesh& newM
     });
 }
 
-void fillOnly(const Mesh& mesh, const BuildOptions& options, const DeviceFiller& device) {
+DeviceTimes fillOnly(const Mesh& mesh, const BuildOptions& options, const DeviceFiller& device) {
     checkOptions(options);
     refuseForDevices(options, device);
     openvdb::initialize();
-    withThreads(options.threads, [&] {
+    return withThreads(options.threads, [&] {
         FieldFiller field(mesh, options, &device);
         fillWhole(field);
+        return field.times().device;
     });
 }
 

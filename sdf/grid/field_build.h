@@ -32,7 +32,7 @@ LevelSet rebuildField(const LevelSet& old, const Mesh& oldMesh, const Mesh& newM
 FilledPart buildPart(const Mesh& mesh, const BuildOptions& options, const FieldPart& part);
 
 /// Fills the blocks of a mesh's field as build() does, but builds no level set: the device keeps its results. Fills
-/// again by another sign method if the device counts conflicts. Throws as build() does.
-void fillOnly(const Mesh& mesh, const BuildOptions& options, const DeviceFiller& device);
+/// again by another sign method if the device counts conflicts. Returns what the device took. Throws as build() does.
+DeviceTimes fillOnly(const Mesh& mesh, const BuildOptions& options, const DeviceFiller& device);
 
 }  // namespace bilayer::detail

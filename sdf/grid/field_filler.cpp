@@ -101,7 +101,7 @@ void FieldFiller::fillWithOwnSigns() {
     Counts counts;
     const MeshJob job = jobFor(mesh_, parameters.reach, true, assembler, counts);
     if (device_)
-        device_->fill({job, options_, extent_.box, parameters});
+        times_.device += device_->fill({job, options_, extent_.box, parameters});
     else
         fillDoubleLayer(job, extent_.box, options_.doubleLayer, parameters);
     times_.fill += watch.lap();
@@ -143,7 +143,7 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     if (adapt) adapt(job, assembler);
     // Flipping triangles does not change the bounding box.
     if (device_)
-        device_->fill({job, options_, extent_.box, {}});
+        times_.device += device_->fill({job, options_, extent_.box, {}});
     else if (method == Method::exact)
         fillExact(job, extent_.box);
     else

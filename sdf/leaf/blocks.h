@@ -13,6 +13,7 @@
 #include <span>
 #include <string>
 
+#include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/options.h>
 
@@ -99,8 +100,8 @@ struct FillJob {
 struct DeviceFiller {
     std::string backend;  ///< "opencl"
     std::string device;   ///< the device's name
-    /// Fills the blocks of one job. A build passes on any exception that it throws.
-    std::function<void(const FillJob&)> fill;
+    /// Fills the blocks of one job, and returns what that took. A build passes on any exception that it throws.
+    std::function<DeviceTimes(const FillJob&)> fill;
 };
 
 }  // namespace bilayer::detail

@@ -12,6 +12,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/bullet/world.h"
 #include "tests/support/support.h"
 
@@ -30,12 +31,12 @@ Pair bodyOf(const Mesh& mesh, float voxelSize) {
     const LevelSet field = build(mesh, {.voxelSize = voxelSize});
     const auto path = scratch("body.vdb");
     const auto made = std::make_shared<Collider>(mesh, field, ColliderOptions{.margin = 0.6f * voxelSize});
-    writeVdb(path, withBody(field, made->data().body));
+    writeVdb(path, withBody(field, dataOf(*made).body));
     return {made, std::make_shared<Collider>(readVdb(path))};
 }
 
 // The poses of a pile of two fields, a ball and a block over 1.5 s.
-std::vector<btTransform> heap(const std::shared_ptr<const Collider>& knot,
+std::vector<btTransform> pile(const std::shared_ptr<const Collider>& knot,
                               const std::shared_ptr<const Collider>& slab) {
     Shape floor(slab), body(knot, {.frame = bullet::centreOfMassFrame(*knot)});
     btSphereShape ball(0.1f);
@@ -58,7 +59,7 @@ std::vector<btTransform> heap(const std::shared_ptr<const Collider>& knot,
 TEST_CASE("Bodies from files move as those of meshes, to the bit") {
     const Pair knot = bodyOf(shapes::torusKnot(2, 3, 0.25f, 0.08f, 200, 16), 0.02f);
     const Pair slab = bodyOf(shapes::box({2, 2, 0.1f}, 4), 0.04f);
-    const auto expected = heap(knot.made, slab.made), poses = heap(knot.loaded, slab.loaded);
+    const auto expected = pile(knot.made, slab.made), poses = pile(knot.loaded, slab.loaded);
     REQUIRE(poses.size() == expected.size());
     for (std::size_t i = 0; i < poses.size(); ++i) {
         CAPTURE(i);

@@ -14,6 +14,7 @@
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "sdf/base/access.h"
 #include "tests/bullet/field_and_mesh.h"
 #include "tests/bullet/world.h"
 #include "tests/support/support.h"
@@ -180,7 +181,7 @@ TEST_CASE("A body from a file answers casts and contact tests as the one of its 
     const LevelSet field = build(mesh, {.voxelSize = voxel});
     const auto path = scratch("casts.vdb");
     const auto made = std::make_shared<Collider>(mesh, field);
-    writeVdb(path, withBody(field, made->data().body));
+    writeVdb(path, withBody(field, dataOf(*made).body));
     Shape ofMesh(made), ofFile(std::make_shared<Collider>(readVdb(path)));
     World meshes, files;
     meshes.add(ofMesh, 0, {0, 0, 0});

@@ -10,6 +10,7 @@
 #include <bilayer/sdf/build.h>
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/bullet/world.h"
 
 namespace bilayer::draw_test {
@@ -123,6 +124,6 @@ TEST_CASE("A band is outlined by the blocks that it lies in") {
     CHECK((again.lower - drawer.lower).length() < 1e-5f);
     CountingDrawer points;
     bullet::drawFields(world.dynamics, points, {.band = false, .points = true});
-    CHECK(points.lines == static_cast<int>(shape.collider().data().points().points().size()));
+    CHECK(points.lines == static_cast<int>(bilayer::detail::dataOf(shape.collider()).points().points().size()));
 }
 }  // namespace bilayer::draw_test

@@ -18,6 +18,7 @@
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/contact_shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "sdf/base/access.h"
 #include "tests/bullet/world.h"
 #include "tests/support/contacts.h"
 #include "tests/support/support.h"
@@ -202,7 +203,7 @@ TEST_CASE("A flat end above a flat face has the face's normal at each contact, a
     std::mt19937 random(start);
     std::uniform_real_distribution<float> part(0, 1);
     std::vector<glm::vec3> onTop;
-    for (const SurfacePoint& point : plate->data().points().points())
+    for (const SurfacePoint& point : dataOf(*plate).points().points())
         if (point.normal.z > 0.9999f && std::max(std::abs(point.position.x), std::abs(point.position.y)) < 0.2f)
             onTop.push_back(point.position);
     REQUIRE(onTop.size() > 20);

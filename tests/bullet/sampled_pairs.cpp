@@ -13,6 +13,7 @@
 #include <bilayer/sdf/build.h>
 #include "collider/contact/search/sampled_contacts.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -61,7 +62,7 @@ struct Crowd {
 };
 
 // Compares every pair's contacts by the sampler with those of the CPU. Returns their count.
-std::size_t check(const PointSampler& sampler, const Crowd& crowd, float margin) {
+std::size_t check(const PointSampler& sampler, const Crowd& crowd, float margin, DeviceTimes* times = nullptr) {
     const ContactOptions options{
         .margin = margin, .minNormalCosine = 0.3f, .minNormalCosineApart = 0.9f, .keepsObliqueEdges = false};
     std::vector<SampledBody> bodies;
@@ -75,8 +76,9 @@ std::size_t check(const PointSampler& sampler, const Crowd& crowd, float margin)
             queries.back().other = j;
         }
     FoundPoints found;
-    sampler.data().sample(bodies, queries, found);
+    dataOf(sampler).sample(bodies, queries, found);
     REQUIRE(found.begins.size() == queries.size() + 1);
+    if (times) *times = found.times;
 
     std::size_t total = 0, differing = 0;
     const auto queryOf = [&](std::size_t i, std::size_t j) { return i * (crowd.bodies.size() - 1) + j - (j > i); };
@@ -100,6 +102,7 @@ struct Played {
     std::vector<float> poses;    // of all bodies, after every step
     std::vector<int> sampled{};  // count of pairs, in every step
     int pairs = 0;
+    int stepsOnDevice = 0;  // that report times of kernels
 };
 
 // A pile that falls and comes nearly to rest.
@@ -125,6 +128,7 @@ Played play(PointSampler sampler, unsigned seed) {
         world.run(1 / 240.f);
         played.sampled.push_back(world.dispatcher.statistics().sampled);
         played.pairs += world.dispatcher.statistics().pairs;
+        played.stepsOnDevice += world.dispatcher.statistics().device.kernels > 0;
         for (const btRigidBody* body : bodies) {
             btScalar matrix[16];
             body->getWorldTransform().getOpenGLMatrix(matrix);
@@ -155,9 +159,8 @@ TEST_CASE("bodies that do not fit on the device together take turns") {
             if (Crowd crowd(random, 4); check(openclPointSampler(device), crowd, 0.002f) > 20) return crowd;
     };
     const Crowd first = touchingCrowd(), second = touchingCrowd();
-    const OpenclPointSampler profiled = openclPointSampler(device, {.profile = true});
-    check(profiled, first, 0.002f);
-    const OpenclTimes times = profiled.times();
+    DeviceTimes times;
+    check(openclPointSampler(device, {.profile = true}), first, 0.002f, &times);
     CHECK(times.kernels > 0);
     CHECK(times.peakBytes > 1 << 20);
     const std::uint64_t mebibytes = times.peakBytes / (1 << 20) + 2;
@@ -175,8 +178,10 @@ TEST_CASE("a pile sampled on a device moves as one on the processor, on any coun
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
         tbb::task_arena arena(threads);
         arena.execute([&] {
-            const Played played = play(openclPointSampler(openDevice()), seed);
+            const Played played = play(openclPointSampler(openDevice(), {.profile = true}), seed);
             CHECK(played.poses == expected.poses);
+            CHECK(played.stepsOnDevice ==
+                  std::count_if(played.sampled.begin(), played.sampled.end(), [](int pairs) { return pairs > 0; }));
             CHECK(played.pairs == expected.pairs);
             CHECK(std::accumulate(played.sampled.begin(), played.sampled.end(), 0) > played.pairs / 4);
         });
@@ -188,11 +193,11 @@ TEST_CASE("the processor takes over if the sampler fails half-way, with the same
     CAPTURE(seed);
     const auto works = openclPointSampler(openDevice());
     int left = 5;
-    const PointSampler breaks({"opencl", "a device", [&](const auto& bodies, const auto& queries, FoundPoints& found) {
-                                   if (left-- == 0)
-                                       throw std::runtime_error("the device is gone (as this test has it)");
-                                   works.data().sample(bodies, queries, found);
-                               }});
+    const auto breaks = makeOf<PointSampler>(
+        DeviceSampler{"opencl", "a device", [&](const auto& bodies, const auto& queries, FoundPoints& found) {
+                          if (left-- == 0) throw std::runtime_error("the device is gone (as this test has it)");
+                          dataOf(works).sample(bodies, queries, found);
+                      }});
     const Played expected = play({}, seed), played = play(breaks, seed);
     CHECK(left == -1);
     CHECK(std::count_if(played.sampled.begin(), played.sampled.end(), [](int pairs) { return pairs > 0; }) == 5);

@@ -124,8 +124,8 @@ Seen seenOf(const btManifoldPoint& point, bool meshIsFirst) {
             meshIsFirst ? first : second, meshIsFirst ? second : first};
 }
 
-bool tell(btManifoldPoint& point, const btCollisionObjectWrapper* first, int part0, int index0,
-          const btCollisionObjectWrapper*, int part1, int index1) {
+bool storeTriangle(btManifoldPoint& point, const btCollisionObjectWrapper* first, int part0, int index0,
+                   const btCollisionObjectWrapper*, int part1, int index1) {
     CHECK(Id(part0, index0) == Id(point.m_partId0, point.m_index0));
     CHECK(Id(part1, index1) == Id(point.m_partId1, point.m_index1));
     told.push_back(seenOf(point, first->getCollisionObject()->isStaticObject()));
@@ -135,7 +135,7 @@ bool tell(btManifoldPoint& point, const btCollisionObjectWrapper* first, int par
 /// The identifiers of a step's contacts in callbacks; the manifolds hold the same.
 std::vector<Seen> namesOf(World& world) {
     told.clear();
-    gContactAddedCallback = tell;
+    gContactAddedCallback = storeTriangle;
     world.dynamics.performDiscreteCollisionDetection();
     gContactAddedCallback = nullptr;
     for (int m = 0; m < world.dispatcher.getNumManifolds(); ++m) {
@@ -258,7 +258,7 @@ struct Test : btCollisionWorld::ContactResultCallback {
 
 bool tellChildren(btManifoldPoint& point, const btCollisionObjectWrapper* first, int part0, int index0,
                   const btCollisionObjectWrapper* second, int part1, int index1) {
-    tell(point, first, part0, index0, second, part1, index1);
+    storeTriangle(point, first, part0, index0, second, part1, index1);
     const btCollisionObjectWrapper* mesh = first->getCollisionObject()->isStaticObject() ? first : second;
     // Bullet's own contacts have a triangle in place of the mesh
     if (mesh->getCollisionShape()->getShapeType() == TRIANGLE_SHAPE_PROXYTYPE) mesh = mesh->m_parent;

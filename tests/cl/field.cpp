@@ -188,7 +188,7 @@ TEST_CASE("a field on a device needs memory, says how much, and what it took") {
 
     std::vector<glm::vec3> points(200000);
     std::vector<Sample> samples(points.size());
-    const OpenclTimes times = field.sample(points, samples);
+    const DeviceTimes times = field.sample(points, samples);
     CHECK(times.kernels > 0);
     CHECK(times.download >= 0);
 }

@@ -19,6 +19,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "cl/detail/program.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/leaf/blocks.h"
 #include "tests/support/support.h"
@@ -139,16 +140,16 @@ void checkSameTriangles(const Mesh& mesh, const BuildOptions& options, const Lev
 }
 
 // Compares both fillers; shared by all tests. Returns the times of the device.
-OpenclTimes checkFillers(const Mesh& mesh, const BuildOptions& options, const OpenclOptions& opencl = {}) {
+DeviceTimes checkFillers(const Mesh& mesh, const BuildOptions& options, const OpenclOptions& opencl = {}) {
     const LevelSet expected = build(mesh, options);
     REQUIRE(expected.activeVoxels() > 0);
-    const OpenclFiller filler = openclFiller(openDevice(), opencl);
+    const BlockFiller filler = openclFiller(openDevice(), opencl);
     const LevelSet found = build(mesh, options, filler);
     checkSame(expected, found, options.method == Method::doubleLayer ? 0 : openclMargin);
     CHECK(found.sign() == expected.sign());
     CHECK(found.signReason() == expected.signReason());
     if (options.triangles) checkSameTriangles(mesh, options, expected, found);
-    return filler.times();
+    return found.buildTimes().device;
 }
 
 struct Shape {
@@ -284,7 +285,7 @@ TEST_CASE("a little device memory means many batches and the same field") {
     CAPTURE(memory);
     const LevelSet expected = build(mesh, options);
     REQUIRE(expected.leaves() * blockVoxels * sizeof(float) > memory << 20);
-    const OpenclTimes times = checkFillers(mesh, options, {.memoryMiB = memory, .profile = true});
+    const DeviceTimes times = checkFillers(mesh, options, {.memoryMiB = memory, .profile = true});
     CHECK(times.peakBytes <= memory << 20);
     CHECK(times.kernels > 0);
 }
@@ -298,25 +299,25 @@ TEST_CASE("a device keeps buffers for the next build, which may be of another me
     std::uint64_t kept = 0;
     for (int i = 0; i < 3; ++i) {
         checkSame(expected, build(ball, ofBall, openclFiller(device)));
-        CHECK(device.impl().spareBytes > 0);
-        if (i > 0) CHECK(device.impl().spareBytes == kept);  // the spare buffers were reused, and none was added
-        kept = device.impl().spareBytes;
+        CHECK(dataOf(device).spareBytes > 0);
+        if (i > 0) CHECK(dataOf(device).spareBytes == kept);  // the spare buffers were reused, and none was added
+        kept = dataOf(device).spareBytes;
     }
     constexpr std::uint64_t memory = 4;
-    const OpenclFiller small = openclFiller(device, {.memoryMiB = memory});
-    checkSame(other, build(ring, ofRing, small));
-    CHECK(small.times().peakBytes > 0);
-    CHECK(small.times().peakBytes <= memory << 20);
-    CHECK(small.times().kernels == 0);  // not measured without `profile`
-    CHECK(device.impl().spareBytes <= memory << 20);
+    const LevelSet small = build(ring, ofRing, openclFiller(device, {.memoryMiB = memory}));
+    checkSame(other, small);
+    CHECK(small.buildTimes().device.peakBytes > 0);
+    CHECK(small.buildTimes().device.peakBytes <= memory << 20);
+    CHECK(small.buildTimes().device.kernels == 0);  // not measured without `profile`
+    CHECK(dataOf(device).spareBytes <= memory << 20);
     checkSame(expected, build(ball, ofBall, openclFiller(device)));
 }
 
 TEST_CASE("results come from a device with memory of its own") {
     const Device device = openDevice();
-    device.impl().info.unifiedMemory = false;
+    dataOf(device).info.unifiedMemory = false;
     const KernelMapping mapping = GENERATE(KernelMapping::blockPerItem, KernelMapping::groupPerBlock);
-    const OpenclFiller filler = openclFiller(device, {.mapping = mapping, .profile = true});
+    const BlockFiller filler = openclFiller(device, {.mapping = mapping, .profile = true});
     const Mesh mesh = shapes::torus(1.f, 0.4f);
     for (const bool triangles : {false, true}) {
         BuildOptions options = optionsFor(mesh, 150, GENERATE(Method::exact, Method::doubleLayer));
@@ -325,13 +326,14 @@ TEST_CASE("results come from a device with memory of its own") {
         CAPTURE(int(mapping), triangles, int(options.method), found.leaves());
         checkSame(expected, found);
         if (triangles) checkSameTriangles(mesh, options, expected, found);
-        CHECK(device.impl().pinned.size() == 1);
+        CHECK(dataOf(device).pinned.size() == 1);
+        CHECK(found.buildTimes().device.download > 0);
+        CHECK(expected.buildTimes().device.kernels == 0);
     }
-    CHECK(filler.times().download > 0);
 }
 
 TEST_CASE("a device without double precision is refused by name") {
-    DeviceImpl& impl = openDevice().impl();
+    DeviceImpl& impl = dataOf(openDevice());
     auto single = std::make_shared<DeviceImpl>();
     single->info = impl.info;
     single->info.name = "Single";
@@ -341,7 +343,7 @@ TEST_CASE("a device without double precision is refused by name") {
     single->queue = impl.queue;
     const Mesh mesh = shapes::sphere(1.f, 2);
     for (const Method method : {Method::exact, Method::doubleLayer})
-        CHECK_THROWS_WITH(build(mesh, optionsFor(mesh, 20, method), openclFiller(Device(single))),
+        CHECK_THROWS_WITH(build(mesh, optionsFor(mesh, 20, method), openclFiller(makeOf<Device>(single))),
                           Contains("Single") && Contains("double precision"));
 }
 

@@ -16,6 +16,7 @@
 #include "cl/detail/program.h"
 #include "collider/contact/search/sampled_contacts.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "sdf/base/openvdb.h"
 
 namespace bilayer::lost_device_test {
@@ -165,14 +166,14 @@ TEST_CASE("points are sampled again once a device that was lost is back") {
                                   {1, 0, glm::mat3(1), {-1.5f, 0, 0}, 1, 0.1f}};
     const PointSampler sampler = openclPointSampler(openDevice());
     FoundPoints expected, found;
-    sampler.data().sample(bodies, queries, expected);
+    dataOf(sampler).sample(bodies, queries, expected);
     REQUIRE(expected.points.size() > 10);
     failing = kernels;
     callsLeft = 0;
-    CHECK_THROWS_WITH(sampler.data().sample(bodies, queries, found),
+    CHECK_THROWS_WITH(dataOf(sampler).sample(bodies, queries, found),
                       Contains("clEnqueueNDRangeKernel") && Contains("CL_DEVICE_NOT_AVAILABLE"));
     callsLeft = INT_MAX;
-    sampler.data().sample(bodies, queries, found);
+    dataOf(sampler).sample(bodies, queries, found);
     CHECK(found.begins == expected.begins);
 }
 }  // namespace bilayer::lost_device_test

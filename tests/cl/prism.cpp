@@ -295,9 +295,8 @@ TEST_CASE("too little device memory for prisms is an error that says how much is
 TEST_CASE("a build of prisms reports what it took on the device") {
     const Mesh mesh = shapes::sphere(1.f, 4);
     const std::uint64_t memory = 16;
-    const OpenclFiller filler = openclFiller(openDevice(), {.memoryMiB = memory, .profile = true});
-    build(mesh, optionsFor(mesh, 150), filler);
-    const OpenclTimes times = filler.times();
+    const BlockFiller filler = openclFiller(openDevice(), {.memoryMiB = memory, .profile = true});
+    const DeviceTimes times = build(mesh, optionsFor(mesh, 150), filler).buildTimes().device;
     CHECK(times.kernels > 0);
     CHECK(times.peakBytes > sizeof(float) * blockVoxels);
     CHECK(times.peakBytes <= memory << 20);

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "sdf/base/access.h"
 #include "tests/support/support.h"
 
 namespace bilayer::program_test {
@@ -32,7 +33,7 @@ int answer(DeviceImpl& device, const cl::Program& program) {
 // Opens the device again, so that its in-memory program cache is empty, and runs the kernel.
 int answerAnew() {
     const Device device = openDevice();
-    return answer(device.impl(), buildProgram(device.impl(), source, options));
+    return answer(dataOf(device), buildProgram(dataOf(device), source, options));
 }
 
 void overwrite(const std::filesystem::path& path, const std::string& bytes) {
@@ -52,7 +53,7 @@ void cacheIn(const std::filesystem::path& folder) {
 TEST_CASE("a kernel that does not compile is an error with the log") {
     const Device device = openDevice();
     const auto build = [&] {
-        buildProgram(device.impl(), "kernel void broken(global int* out) { *out = unheardOf; }", "");
+        buildProgram(dataOf(device), "kernel void broken(global int* out) { *out = unheardOf; }", "");
     };
     CHECK_THROWS_AS(build(), DeviceError);
     CHECK_THROWS_WITH(build(), Contains("clBuildProgram") && Contains("CL_BUILD_PROGRAM_FAILURE") &&
@@ -61,7 +62,7 @@ TEST_CASE("a kernel that does not compile is an error with the log") {
 
 TEST_CASE("a failed call is reported with its name, its code and the device") {
     const Device device = openDevice();
-    const cl::Program program = buildProgram(device.impl(), source, options);
+    const cl::Program program = buildProgram(dataOf(device), source, options);
     try {
         cl::Kernel(program, "question");
         FAIL("there is no such kernel");
@@ -89,9 +90,9 @@ TEST_CASE("error codes have the names of the standard") {
 TEST_CASE("a device compiles a program once") {
     cacheIn(bilayer::test::scratch("once"));
     const Device device = openDevice();
-    const cl::Program first = buildProgram(device.impl(), source, options);
-    CHECK(buildProgram(device.impl(), source, options)() == first());
-    CHECK(buildProgram(device.impl(), source, "-D ANSWER=43")() != first());
+    const cl::Program first = buildProgram(dataOf(device), source, options);
+    CHECK(buildProgram(dataOf(device), source, options)() == first());
+    CHECK(buildProgram(dataOf(device), source, "-D ANSWER=43")() != first());
 }
 
 TEST_CASE("a program comes back from the disk") {
@@ -109,7 +110,7 @@ TEST_CASE("a program comes back from the disk") {
     // stores the other program under this one's name, which shows whose binary runs
     const Device device = openDevice();
     const std::string other = "-D ANSWER=7";
-    CHECK(answer(device.impl(), buildProgram(device.impl(), source, other)) == 7);
+    CHECK(answer(dataOf(device), buildProgram(dataOf(device), source, other)) == 7);
     std::filesystem::copy_file(cachedProgram(device.info(), source, other), path,
                                std::filesystem::copy_options::overwrite_existing);
     CHECK(answerAnew() == 7);
@@ -149,7 +150,7 @@ TEST_CASE("without a home there is no cache") {
     const std::string home = std::getenv("HOME") ? std::getenv("HOME") : "";
     ::unsetenv("HOME");
     CHECK(cachedProgram(device.info(), source, options).empty());
-    CHECK(answer(device.impl(), buildProgram(device.impl(), source, options)) == 42);
+    CHECK(answer(dataOf(device), buildProgram(dataOf(device), source, options)) == 42);
     ::setenv("HOME", "/home/someone", 1);
     CHECK(cachedProgram(device.info(), source, options).parent_path() == "/home/someone/.cache/bilayer");
     ::setenv("HOME", home.c_str(), 1);

@@ -21,6 +21,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "sdf/base/openvdb_points.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"
@@ -40,10 +41,10 @@ Mesh shifted(Mesh mesh, const glm::vec3& by) {
 // A collider of a mesh, and the same collider read from a file.
 struct Pair {
     explicit Pair(const Mesh& mesh, float voxel, const VdbOptions& file = {}, const ColliderOptions& options = {})
-        : field(build(mesh, {.voxelSize = voxel})), made(mesh, field, options), loaded(read(made.data().body, file)) {}
+        : field(build(mesh, {.voxelSize = voxel})), made(mesh, field, options), loaded(read(dataOf(made).body, file)) {}
 
     Collider withoutMesh() const {
-        Body body = made.data().body;
+        Body body = dataOf(made).body;
         body.mesh.reset();
         return read(body, {});
     }
@@ -150,9 +151,9 @@ TEST_CASE("a body comes back from its file bit by bit") {
     const Pair pair(mesh, voxel, {.halfFloat = half},
                     {.margin = GENERATE(-1.f, 0.0123f),
                      .accuracy = half ? ContactAccuracy::samples : ContactAccuracy::exactNearFeatures});
-    REQUIRE(pair.made.data().points().points().size() > 100);
-    REQUIRE(pair.made.data().body.mesh);
-    requireSame(pair.made.data().body, pair.loaded.data().body);
+    REQUIRE(dataOf(pair.made).points().points().size() > 100);
+    REQUIRE(dataOf(pair.made).body.mesh);
+    requireSame(dataOf(pair.made).body, dataOf(pair.loaded).body);
     REQUIRE(pair.loaded.field().voxelSize() == pair.made.field().voxelSize());
 }
 
@@ -194,7 +195,7 @@ TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
 TEST_CASE("the triangles of a body without a mesh are those of its field") {
     const Pair ball(shapes::sphere(0.4f, 4), 0.02f);
     const Collider loaded = ball.withoutMesh();
-    REQUIRE_FALSE(loaded.data().body.mesh);
+    REQUIRE_FALSE(dataOf(loaded).body.mesh);
     REQUIRE(loaded.mesh().triangles.size() > 1000);
     for (const glm::vec3& point : loaded.mesh().points) REQUIRE(glm::length(point) == Approx(0.4f).margin(1e-3));
     REQUIRE(massProperties(loaded.mesh()).volume == Approx(ball.made.mass().volume).epsilon(5e-3));
@@ -217,7 +218,7 @@ TEST_CASE("A body keeps the flipped triangles of its mesh") {
     const Pair knot(inside, 0.03f, {}, {.accuracy = ContactAccuracy::exact});
     const Mesh outward = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     REQUIRE(massProperties(knot.loaded.mesh()).volume == Approx(massProperties(outward).volume));
-    requireSame(knot.made.data().body, knot.loaded.data().body);
+    requireSame(dataOf(knot.made).body, dataOf(knot.loaded).body);
 }
 
 TEST_CASE("an open mesh has no mass, in a file neither") {
@@ -225,7 +226,7 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     sheet.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
     sheet.triangles = {{0, 1, 2}, {2, 1, 3}};
     const Pair pair(sheet, 0.05f);
-    requireSame(pair.made.data().body, pair.loaded.data().body);
+    requireSame(dataOf(pair.made).body, dataOf(pair.loaded).body);
     REQUIRE_THROWS_WITH(pair.made.mass(), Catch::Contains("no volume"));
     REQUIRE_THROWS_WITH(pair.loaded.mass(), Catch::Contains("no volume"));
     // added to a field that had a body with a mass, it replaces all of that
@@ -322,7 +323,7 @@ TEST_CASE("a damaged mesh of a body is refused, whichever byte it is") {
 
 TEST_CASE("a body with the mesh of another, or with one that is not valid, is refused") {
     const Pair other(shapes::box({0.3f, 0.2f, 0.11f}, 3), 0.02f);
-    requireRefusal(withMeshBytes(meshBytes(withBody(other.field, other.made.data().body))->value()),
+    requireRefusal(withMeshBytes(meshBytes(withBody(other.field, dataOf(other.made).body))->value()),
                    "'bilayer:mesh_hash'");
     Body body = bodyOf(stored());
     Mesh bad = *body.mesh;

@@ -11,6 +11,7 @@
 #include <bilayer/sdf/build.h>
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/collider/touching_bodies.h"
 #include "tests/support/contacts.h"
 #include "tests/support/random.h"
@@ -61,7 +62,7 @@ TEST_CASE("the contact of two balls is on the line of their centres") {
         CAPTURE(gap, contacts.size());
         REQUIRE(contacts.size() > 2);
         REQUIRE(report.beyondBand == 0);
-        REQUIRE(report.pointsTested < ball().data().points().points().size());
+        REQUIRE(report.pointsTested < dataOf(ball()).points().points().size());
         // points are 2 voxels apart, so the nearest may miss the line by 1.25 spacings: 0.05 on a radius of 0.4
         REQUIRE(minDistance(contacts) == Approx(gap).margin(0.0063));
         REQUIRE(minDistance(contacts) >= gap - interpolated);
@@ -209,8 +210,8 @@ TEST_CASE("the tree leaves no contact out") {
         const auto contacts = contactsOf(a, b, h, &report);
         std::vector<std::uint32_t> all;
         const auto test = [&](const Placed& body, const Placed& other, std::uint32_t flag) {
-            for (std::uint32_t i = 0; i < body.collider.data().points().points().size(); ++i) {
-                const glm::vec3 world = body.pose.toWorld(body.collider.data().points().points()[i].position);
+            for (std::uint32_t i = 0; i < dataOf(body.collider).points().points().size(); ++i) {
+                const glm::vec3 world = body.pose.toWorld(dataOf(body.collider).points().points()[i].position);
                 const Sample sample = other.collider.field().sample(other.pose.toBody(world));
                 if (sample.inBand && sample.distance < h - 1e-5f) all.push_back(i | flag);
             }
@@ -222,7 +223,7 @@ TEST_CASE("the tree leaves no contact out") {
         REQUIRE(std::is_sorted(found.begin(), found.end()));
         REQUIRE(std::includes(found.begin(), found.end(), all.begin(), all.end()));
         tested += report.pointsTested;
-        total += a.collider.data().points().points().size() + b.collider.data().points().points().size();
+        total += dataOf(a.collider).points().points().size() + dataOf(b.collider).points().points().size();
     }
     REQUIRE(tested < total);  // a ball in a ring may need all of them, the pairs together do not
 }
@@ -235,7 +236,7 @@ TEST_CASE("separate bodies have no contact and cost almost nothing") {
     // a small ball in the hole of a ring: their boxes overlap, the bodies do not
     REQUIRE(contactsOf({ball(), {}, 0.3f}, {ring()}, h, &report).empty());
     REQUIRE(report.pointsTested <
-            (ball().data().points().points().size() + ring().data().points().points().size()) / 4);
+            (dataOf(ball()).points().points().size() + dataOf(ring()).points().points().size()) / 4);
     const float nan = std::numeric_limits<float>::quiet_NaN();
     REQUIRE(contactsOf({ball(), {{nan, 0, 0}}}, {ball()}, h, &report).empty());
     REQUIRE(report.beyondBand == 0);
@@ -244,7 +245,7 @@ TEST_CASE("separate bodies have no contact and cost almost nothing") {
 TEST_CASE("points too deep for the band are counted") {
     ContactReport report;
     const auto contacts = contactsOf({brick(), {}, 0.5f}, {ball()}, 0, &report);
-    REQUIRE(report.beyondBand == brick().data().points().points().size());
+    REQUIRE(report.beyondBand == dataOf(brick()).points().points().size());
     REQUIRE(contacts.empty());
 }
 
@@ -309,7 +310,7 @@ std::vector<std::uint32_t> pointsInContact(const Placed& a, const Placed& b, con
     std::vector<std::uint32_t> points;
     for (const Contact& contact : contacts) {
         const Placed& body = contact.feature & featureOfB ? b : a;
-        const bool isPoint = (contact.feature & ~featureOfB) < body.collider.data().points().points().size();
+        const bool isPoint = (contact.feature & ~featureOfB) < dataOf(body.collider).points().points().size();
         if (isPoint && contact.distance < options.margin - tolerance) points.push_back(contact.feature);
     }
     return points;

@@ -14,6 +14,7 @@
 #include <bilayer/sdf/build.h>
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/support/analytic.h"
 #include "tests/support/contacts.h"
 #include "tests/support/random.h"
@@ -52,9 +53,9 @@ TEST_CASE("a body of a mesh that faces the wrong way is the body of the right on
     const Collider right(mesh, build(mesh, {.voxelSize = h}), options),
         repaired(wrong, build(wrong, {.voxelSize = h}), options);
     CHECK(repaired.mass().volume == Approx(right.mass().volume));
-    CHECK(repaired.data().edges().edges().empty());
-    REQUIRE(repaired.data().points().points().size() > 100);
-    for (const SurfacePoint& point : repaired.data().points().points())
+    CHECK(dataOf(repaired).edges().edges().empty());
+    REQUIRE(dataOf(repaired).points().points().size() > 100);
+    for (const SurfacePoint& point : dataOf(repaired).points().points())
         REQUIRE(glm::dot(point.normal, right.field().sample(point.position).gradient) > 0.5f);
     // crossed: inward normals would remove the points
     const Pose across{{0.35f, 0, 0}, glm::angleAxis(glm::half_pi<float>(), glm::vec3(1, 0, 0))};
@@ -88,9 +89,9 @@ TEST_CASE("a body whose mesh is open or one-sided has the mass of its field, and
         const LevelSet field = build(mesh, {.voxelSize = h});
         const Collider body(mesh, field);
         CAPTURE(mesh.triangles.size(), field.sign());
-        if (body.data().body.mass) CHECK(body.mass().volume == massProperties(field).volume);
-        const Collider kept(withBody(field, body.data().body));
-        CHECK(kept.data().points().points().size() == body.data().points().points().size());
+        if (dataOf(body).body.mass) CHECK(body.mass().volume == massProperties(field).volume);
+        const Collider kept(withBody(field, dataOf(body).body));
+        CHECK(dataOf(kept).points().points().size() == dataOf(body).points().points().size());
     }
     const Collider box(open, build(open, {.voxelSize = h}));
     CHECK(box.mass().volume == Approx(0.6 * 0.4 * 0.2).epsilon(0.05));

@@ -12,6 +12,7 @@
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/threads.h"
+#include "sdf/base/access.h"
 #include "tests/collider/touching_bodies.h"
 #include "tests/support/analytic.h"
 #include "tests/support/contacts.h"
@@ -106,7 +107,7 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
         Errors worst;
         for (const Contact& contact : contacts) {
             const int other = contact.feature & featureOfB ? 0 : 1;
-            const auto points = parts[std::size_t(1 - other)].data().points().points();
+            const auto points = dataOf(parts[std::size_t(1 - other)]).points().points();
             const std::uint32_t index = contact.feature & ~featureOfB;
             // for crossing edges the distance is not that of a point
             if (index >= points.size()) continue;

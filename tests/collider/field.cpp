@@ -15,6 +15,7 @@
 #include "collider/contact/body/collider_data.h"
 #include "collider/field/samples/field_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "sdf/base/openvdb.h"
 #include "tests/support/random.h"
 #include "tests/support/sampling.h"
@@ -89,7 +90,7 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
     const float edge = Clearance::cellSide * float(h);
     for (const Solid& solid : smallSolids()) {
         const Field field(levelSetOf(solid, h, 3, 6));
-        const Clearance clearance = field.data().coarse;
+        const Clearance clearance = dataOf(field).coarse;
         int farPoints = 0, ruledOut = 0;
         for (int i = 0; i < 20000; ++i) {
             const glm::vec3 p = random.point(i % 4 ? 0.6 : 3);
@@ -111,8 +112,8 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
     }
     const Field field(levelSetOf(sphereSolid(0.4), h));
     for (const glm::vec3& p : {glm::vec3(notANumber, 0, 0), glm::vec3(0, notANumber, 0)})
-        REQUIRE_FALSE(field.data().coarse.isOutside(p, 1));
-    for (const float far : {1e9f, 1e30f, infinity, -infinity}) REQUIRE(field.data().coarse.isOutside({0, far, 0}, 1));
+        REQUIRE_FALSE(dataOf(field).coarse.isOutside(p, 1));
+    for (const float far : {1e9f, 1e30f, infinity, -infinity}) REQUIRE(dataOf(field).coarse.isOutside({0, far, 0}, 1));
 }
 
 TEST_CASE("a sample within a reach is the sample, its gradient only there") {

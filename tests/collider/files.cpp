@@ -22,6 +22,7 @@
 #include "collider/contact/body/body.h"
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "sdf/base/openvdb_points.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -293,12 +294,12 @@ TEST_CASE("what is written can be read, whatever the size of the body") {
                         {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
         const LevelSet plain = build(mesh, {.voxelSize = size / 12});
         const Collider made(mesh, plain);
-        writeVdb(path, withBody(plain, made.data().body));
+        writeVdb(path, withBody(plain, dataOf(made).body));
         const Collider read(readVdb(path));
-        REQUIRE(read.data().body.mass.has_value() == made.data().body.mass.has_value());
-        REQUIRE(made.data().body.mass.has_value() == (size < 1e8f));
-        if (made.data().body.mass) REQUIRE(read.mass().volume == made.mass().volume);
-        if (!made.data().body.mass) REQUIRE_THROWS_WITH(made.mass(), Catch::Contains("single precision"));
+        REQUIRE(dataOf(read).body.mass.has_value() == dataOf(made).body.mass.has_value());
+        REQUIRE(dataOf(made).body.mass.has_value() == (size < 1e8f));
+        if (dataOf(made).body.mass) REQUIRE(read.mass().volume == made.mass().volume);
+        if (!dataOf(made).body.mass) REQUIRE_THROWS_WITH(made.mass(), Catch::Contains("single precision"));
     }
     const LevelSet field = stored();
     Body body = bodyOf(field);

@@ -16,6 +16,7 @@
 #include <bilayer/collider/collider.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
@@ -62,7 +63,7 @@ TEST_CASE(
         const Field field = fieldOf(mesh);
         const InterpolationErrorMask errorMask(field);
         const Truth truth(mesh);
-        const FieldLayout& layout = field.data();
+        const FieldLayout& layout = dataOf(field);
         const auto offAt = [&](const glm::vec3& place) {
             return std::abs(double(field.distance(place)) - truth.signedDistance(glm::dvec3(place))) / voxel;
         };
@@ -124,7 +125,7 @@ TEST_CASE("edges are in the interpolation-error mask, faces and gentle bends are
 
     const Mesh ring = shapes::torus(0.3f, 0.1f);
     const Collider smooth(ring, build(ring, {.voxelSize = voxel}));
-    CHECK_FALSE(smooth.data().isExactAt({0.4f, 0, 0}));
-    CHECK(smooth.data().isExactAt({0.4f, 0, 0}, true));
+    CHECK_FALSE(dataOf(smooth).isExactAt({0.4f, 0, 0}));
+    CHECK(dataOf(smooth).isExactAt({0.4f, 0, 0}, true));
 }
 }  // namespace bilayer::interpolation_error_test

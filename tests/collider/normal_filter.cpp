@@ -13,6 +13,7 @@
 #include "collider/contact/body/collider_data.h"
 #include "collider/contact/search/normal_filter.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/collider/touching_bodies.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -25,9 +26,9 @@ namespace {
 
 // The feature of a contact: a surface point, or a place on a sharp edge between two of them.
 SurfacePoint pointOf(const Collider& collider, std::uint32_t feature) {
-    const auto points = collider.data().points().points();
+    const auto points = dataOf(collider).points().points();
     if (feature < points.size()) return points[feature];
-    const SharpEdge& edge = collider.data().edges().edges()[feature - points.size()];
+    const SharpEdge& edge = dataOf(collider).edges().edges()[feature - points.size()];
     const SurfacePoint &from = points[edge.from], &to = points[edge.to];
     return {0.5f * (from.position + to.position), glm::normalize(from.normal + to.normal), true};
 }
@@ -107,7 +108,7 @@ TEST_CASE("a face point that touches an edge makes no oblique contact") {
     CAPTURE(seed, scale);
     Random random(seed);
     const Collider ground(shapes::box({1, 1, 0.1f}), levelSetOf(boxSolid({1, 1, 0.1}), h));
-    const auto points = ground.data().points().points();
+    const auto points = dataOf(ground).points().points();
     int tested = 0;
     for (int i = 0; i < 10000; ++i) {
         const SurfacePoint& point = points[std::size_t(random(0, 1) * double(points.size() - 1))];

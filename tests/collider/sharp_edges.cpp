@@ -8,6 +8,7 @@
 #include <bilayer/sdf/build.h>
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/support/support.h"
 
 namespace bilayer::sharp_edges_test {
@@ -33,9 +34,9 @@ TEST_CASE("Sharp edges are those of the mesh, and none crosses a groove") {
         mesh = shapes::join(parts);
     }
     const Collider collider(mesh, build(mesh, {.voxelSize = h, .interiorWidthVoxels = 6}));
-    const auto points = collider.data().points().points();
+    const auto points = dataOf(collider).points().points();
     double total = 0;
-    for (const SharpEdge& edge : collider.data().edges().edges()) {
+    for (const SharpEdge& edge : dataOf(collider).edges().edges()) {
         REQUIRE(edge.from < edge.to);
         const glm::vec3 &a = points[edge.from].position, &b = points[edge.to].position;
         total += glm::distance(a, b);

@@ -13,6 +13,7 @@
 #include "collider/field/zero/zero_queries.h"
 #include "collider/field/zero/zero_search.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"
 #include "tests/support/sampling.h"
@@ -88,8 +89,8 @@ TEST_CASE("the nearest zero is found in time where all of the surface is equally
         const double cells = 1.5 * 4 * 3.14159 * voxels * voxels;  // that contain surface
         for (const double off : {0., 1e-5, 1e-3, 0.03, 1., 0.9 * voxels}) {
             const glm::vec3 point(centre + off * h * glm::dvec3(random.direction()));
-            Counted<NearestQuery> nearest(field.data().toLocal(point), std::numeric_limits<double>::infinity());
-            ZeroSearch(field.data(), nearest).run();
+            Counted<NearestQuery> nearest(dataOf(field).toLocal(point), std::numeric_limits<double>::infinity());
+            ZeroSearch(dataOf(field), nearest).run();
             const double truth = voxels - glm::distance(glm::dvec3(point), centre) / h;
             CAPTURE(voxels, off, nearest.bounds, cells);
             CHECK(double(nearest.bounds) < 10 * cells + 2e5);
@@ -120,13 +121,13 @@ TEST_CASE("spheres that fit their cavity are cast and tested in time") {
             const double reach = nearest - room;
             const auto radius = float(reach * h);
             const Ray ray{centre, random.direction()};
-            const glm::dvec3 from = field.data().toLocal(centre), along = glm::normalize(glm::dvec3(ray.direction));
+            const glm::dvec3 from = dataOf(field).toLocal(centre), along = glm::normalize(glm::dvec3(ray.direction));
             Counted<AnyNearQuery> any(from, reach);
-            ZeroSearch(field.data(), any).run();
+            ZeroSearch(dataOf(field), any).run();
             Counted<NearestQuery> within(from, reach);
-            ZeroSearch(field.data(), within).run();
+            ZeroSearch(dataOf(field), within).run();
             Counted<SphereCastQuery> cast({from, along, 1e6}, reach);
-            ZeroSearch(field.data(), cast).run();
+            ZeroSearch(dataOf(field), cast).run();
             CAPTURE(voxels, room, cells, any.bounds, within.bounds, cast.bounds);
             for (const std::size_t bounds : {any.bounds, within.bounds, cast.bounds})
                 CHECK(double(bounds) < 10 * cells + 2e5);

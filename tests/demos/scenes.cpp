@@ -46,7 +46,7 @@ void judge(const std::function<Outcome()>& scene, const std::set<std::string>& m
         if (!missed.contains(criterion.name)) {
             CHECK(criterion.met());
         } else if (criterion.met()) {
-            FAIL_CHECK("met by now: it need no longer be known as missed");
+            FAIL_CHECK("met: remove it from the list of those known as missed");
         } else {
             WARN(outcome.title << ": " << criterion.name << " " << criterion.value << " " << criterion.unit
                                << ", at most " << criterion.limit);

@@ -27,28 +27,46 @@ TEST_CASE("the code has no leftovers and no paths of somebody's machine") {
 }
 
 TEST_CASE("no word of our own stands in sources and docs where the field has one") {
-    // assembled here, so that this file does not match itself
-    const std::regex replaced(std::string("\\b(besi") + "des?|asla" + "nt|aske" + "w|last re" + "sort|way ou" +
-                                  "t|stra" + "ys?|swi" + "rl|wand" + "ers?|by and b" + "y|turned aro" + "und|as eve" +
-                                  "r|nobody kn" + "ows|pier" + "c(e|es|ing)|meets its" + "elf)\\b",
-                              std::regex::icase);
+    const std::vector<std::string> words{"besides?",        "aslant",
+                                         "askew",           "creeps?",
+                                         "creeping",        "trembl\\w*",
+                                         "sinks? into",     "way out",
+                                         "strays?",         "swirl",
+                                         "wanders?",        "by and by",
+                                         "as ever",         "last resort",
+                                         "turned around",   "nobody knows",
+                                         "pierc(e|es|ing)", "meets itself",
+                                         "runs? both ways", "carries on",
+                                         "no longer",       "falls back on all sides",
+                                         "listener wants",  "nudges?",
+                                         "foresees?",       "mends?",
+                                         "tells us",        "walks aside",
+                                         "in the ground"};
+    // of identifiers: where min and max are meant, and names that were replaced
+    const std::regex names(
+        "\\b((most|least)[A-Z]\\w*|NoPassing|Stillness|NearPoints|LastResort|AngularMomentum|Wings)\\b");
+    std::string all;
+    for (const std::string& word : words) all += (all.empty() ? "" : "|") + word;
+    const std::regex replaced("\\b(" + all + ")\\b", std::regex::icase);
     std::string wrong;
     const auto check = [&](const std::string& file, int number, const std::string& line) {
-        if (std::regex_search(line, replaced)) wrong += file + ":" + std::to_string(number) + " " + line + "\n";
+        if (file == "tests/house/house.cpp") return;
+        if (std::regex_search(line, replaced) || std::regex_search(line, names))
+            wrong += file + ":" + std::to_string(number) + " " + line + "\n";
     };
     eachLine(check);
     const fs::path root = BILAYER_SOURCES;
-    int pages = 0;
-    for (const auto& entry : fs::recursive_directory_iterator(root / "docs")) {
-        if (entry.path().extension() != ".md") continue;
-        const std::string page = fs::relative(entry.path(), root).generic_string();
+    // not the changelog, which states what replaces the old names
+    std::vector<std::string> pages{"README.md", "CONTRIBUTING.md", "SECURITY.md"};
+    for (const auto& entry : fs::recursive_directory_iterator(root / "docs"))
+        if (entry.path().extension() == ".md") pages.push_back(fs::relative(entry.path(), root).generic_string());
+    for (const std::string& page : pages) {
         std::istringstream text(contents(page));
         std::string line;
         for (int number = 1; std::getline(text, line); ++number) check(page, number, line);
-        ++pages;
     }
     CHECK(wrong == "");
-    CHECK(pages > 30);
+    CHECK(pages.size() > 30);
 }
 
 TEST_CASE("no source file is long") {

@@ -14,6 +14,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/leaf/blocks.h"
 #include "tests/support/support.h"
@@ -348,7 +349,8 @@ TEST_CASE("a build can be cancelled at any moment, whatever the method") {
 }
 
 TEST_CASE("what a filler throws ends the build") {
-    const BlockFiller broken({"broken", "", [](const FillJob&) { throw std::runtime_error("the device is on fire"); }});
+    const auto fill = [](const FillJob&) -> DeviceTimes { throw std::runtime_error("the device is on fire"); };
+    const auto broken = makeOf<BlockFiller>(DeviceFiller{"broken", "", fill});
     CHECK_THROWS_WITH(build(shapes::sphere(1, 2), {.voxelSize = 0.1f, .method = Method::doubleLayer}, broken),
                       "the device is on fire");
 }

@@ -13,6 +13,7 @@
 #include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
@@ -302,7 +303,7 @@ TEST_CASE("the surface points of a body face outward for either orientation of i
     writeMesh(path, inside);
     REQUIRE(run({"build", path.string(), "-o", output.string(), "--voxel-size", "0.05", "--body"}).status == 0);
     const Collider body(readVdb(output));
-    for (const SurfacePoint& point : body.data().points().points())
+    for (const SurfacePoint& point : dataOf(body).points().points())
         REQUIRE(glm::dot(point.normal, point.position) > 0.4f);
 }
 

@@ -11,6 +11,7 @@
 #include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/body/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/access.h"
 #include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
@@ -63,7 +64,7 @@ TEST_CASE("build --body stores the data of bodies, and info reports it") {
     const Collider body(readVdb(output));
     CHECK(body.margin() == 0.02f);
     CHECK(body.mass().volume == Approx(json["mesh"]["volume"].get<double>()));
-    CHECK(json["body"]["points"] == body.data().points().points().size());
+    CHECK(json["body"]["points"] == dataOf(body).points().points().size());
     const auto info = run({"info", output, "--json"}).json();
     CHECK(info["body"] == json["body"]);
     CHECK(info["body"]["margin"] == 0.02);
@@ -79,17 +80,17 @@ TEST_CASE("build --body stores the data of bodies, and info reports it") {
     for (const std::string accuracy : {"exact", "samples"}) {
         const auto other = buildSphere(output, {"--voxel-size", "0.05", "--body", "--contacts", accuracy});
         CHECK(other["body"]["contacts"] == accuracy);
-        CHECK(nameOf(Collider(readVdb(output)).data().body.accuracy) == accuracy);
+        CHECK(nameOf(dataOf(Collider(readVdb(output))).body.accuracy) == accuracy);
         CHECK((Collider(readVdb(output)).field().mesh() != nullptr) == (accuracy == "exact"));
         CHECK(Collider(readVdb(output)).exactField().mesh());
     }
     const auto whole = std::filesystem::file_size(output);
     CHECK(buildSphere(output, {"--voxel-size", "0.05", "--body", "--no-mesh"})["body"]["triangles"] == 0);
-    CHECK_FALSE(Collider(readVdb(output)).data().body.mesh);
+    CHECK_FALSE(dataOf(Collider(readVdb(output))).body.mesh);
     CHECK(std::filesystem::file_size(output) + body.mesh().triangles.size() * sizeof(glm::uvec3) < whole);
     CHECK_THAT(run({"info", output}).out, Catch::Contains("no mesh"));
     buildSphere(output, {"--voxel-size", "0.05", "--body", "--half-float", "--triangles", "--extend"});
-    CHECK(Collider(readVdb(output)).data().points().points().size() == body.data().points().points().size());
+    CHECK(dataOf(Collider(readVdb(output))).points().points().size() == dataOf(body).points().points().size());
 }
 
 TEST_CASE("inspect reports recommended settings") {

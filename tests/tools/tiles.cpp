@@ -101,7 +101,7 @@ TEST_CASE("a build that was killed continues with the missing tiles") {
     CHECK(!fs::exists(folder / "manifest.json"));
     checkRefusal({"merge", folder.string(), "-o", scratch("killed.vdb").string()}, 1, "manifest.json: no such file");
 
-    // what is there stays: a file of the first run keeps its time
+    // existing files stay: one of the first run keeps its time
     std::map<fs::path, fs::file_time_type> times;
     for (const auto& entry : fs::directory_iterator(folder / "work"))
         if (entry.path().extension() == ".record") {

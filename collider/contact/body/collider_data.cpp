@@ -10,12 +10,13 @@
 #include <utility>
 
 #include "collider/field/samples/field_data.h"
+#include "sdf/base/access.h"
 #include "sdf/mesh/topology.h"
 
 namespace bilayer::detail {
 
 Field fieldWithMesh(const Field& samples, std::shared_ptr<const Mesh> mesh) {
-    return Field(std::make_shared<const FieldData>(samples.data(), std::move(mesh)));
+    return makeOf<Field>(std::make_shared<const FieldData>(dataOf(samples), std::move(mesh)));
 }
 
 template <class Make>
@@ -40,7 +41,7 @@ const Field& ColliderData::exactField() const {
 }
 
 const MeshTree& ColliderData::meshTree() const {
-    if (const MeshTree* tree = exactField().data().mesh.get()) return *tree;
+    if (const MeshTree* tree = dataOf(exactField()).mesh.get()) return *tree;
     once(treeOnce_, [&] { zeroSetTree_.emplace(mesh(), field.voxelSize()); });
     return *zeroSetTree_;
 }

@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "collider/field/layout/interpolant.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 namespace {
@@ -25,11 +26,11 @@ constexpr std::uint64_t isTested = 1, isInaccurate = 2;
 
 InterpolationErrorMask::InterpolationErrorMask(const Field& field)
     : field_(std::make_shared<const Field>(field)),
-      known_(new std::atomic<std::uint64_t>[wordsPerBlock * field.data().stored]()) {}
+      known_(new std::atomic<std::uint64_t>[wordsPerBlock * dataOf(field).stored]()) {}
 
 bool InterpolationErrorMask::isMarked(const glm::vec3& point) const noexcept {
     if (!field_) return false;
-    const FieldLayout& layout = field_->data();
+    const FieldLayout& layout = dataOf(*field_);
     const glm::dvec3 local = (glm::dvec3(point) - layout.origin) * layout.perMetre;
     const glm::dvec3 extent = double(blockEdge) * glm::dvec3(layout.blocks);
     if (!(local.x >= 0 && local.y >= 0 && local.z >= 0)) return false;
@@ -58,7 +59,7 @@ bool InterpolationErrorMask::exceedsTolerance(const glm::ivec3& cell) const noex
 
 // Tests a place in voxels from the layout's origin.
 bool InterpolationErrorMask::isOff(const glm::dvec3& local) const noexcept {
-    const FieldLayout& layout = field_->data();
+    const FieldLayout& layout = dataOf(*field_);
     const float voxel = field_->voxelSize();
     const glm::vec3 place(local * layout.voxel + layout.origin);
     const Sample sample = field_->sample(place);

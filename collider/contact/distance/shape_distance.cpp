@@ -17,6 +17,7 @@
 #include "collider/contact/distance/solid_distance.h"
 #include "collider/contact/shapes/placed_shapes.h"
 #include "collider/contact/shapes/shape_data.h"
+#include "sdf/base/access.h"
 
 namespace bilayer {
 
@@ -37,7 +38,7 @@ struct ShapeAndCollider {
           bToWorld(toWorld(b.pose, b.scale)),
           aToB(toWorld(a.pose, a.scale).into(bToWorld)) {}
 
-    const MeshTree& mesh() const { return b.collider.data().meshTree(); }
+    const MeshTree& mesh() const { return dataOf(b.collider).meshTree(); }
 };
 
 BodyDistance separated(const ShapeAndCollider& bodies, const SolidDistance& found) {
@@ -54,7 +55,7 @@ BodyDistance separated(const ShapeAndCollider& bodies, const SolidDistance& foun
 
 /// Of the larger body, if the shape has a size [m].
 double lengthOf(const ShapeAndCollider& bodies) {
-    const auto* convex = std::get_if<Convex>(&bodies.a.shape.data().shape);
+    const auto* convex = std::get_if<Convex>(&dataOf(bodies.a.shape).shape);
     const double ofShape = convex ? 2 * double(bodies.a.scale) * convex->boundingRadius() : 0;
     return std::max(ofShape, detail::lengthOf(bodies.b));
 }
@@ -209,7 +210,7 @@ BodyDistance distance(const PlacedShape& a, const PlacedShape& b, const Distance
     const double limit = searchLimit(options, lengthOf(bodies)) / double(bodies.b.scale);
     DistanceStart own;
     if (start) own.triangleB = order.isSwapped ? start->triangleA : start->triangleB;
-    const auto& shape = bodies.a.shape.data().shape;
+    const auto& shape = dataOf(bodies.a.shape).shape;
     BodyDistance answer;
     if (const auto* convex = std::get_if<Convex>(&shape))
         answer = distanceOf(*convex, bodies, limit, own);

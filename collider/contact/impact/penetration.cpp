@@ -18,6 +18,7 @@
 #include "collider/contact/open_surface/open_surface.h"
 #include "collider/contact/search/edge_probes.h"
 #include "collider/contact/shapes/shape_data.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -104,7 +105,7 @@ class PointSweep {
     void follow(const Collider& collider) {
         body_ = &collider.field();
         const auto reject = [&](const glm::vec3& centre, float radius) { return !comesNear(centre, scale_ * radius); };
-        collider.data().points().visit(reject, [&](std::uint32_t, const SurfacePoint& point) {
+        dataOf(collider).points().visit(reject, [&](std::uint32_t, const SurfacePoint& point) {
             if (!(Surface::isOpen && point.isInner)) follow({point.position, point.normal});
         });
     }
@@ -334,7 +335,7 @@ SharpFeatures sharpFeaturesOn(const OpenSurface& openSurface, float scale, const
 /// @param voxel  the smaller one of both [m]
 Penetration firstOf(const SweptShape& points, const SweptShape& other, float voxel) {
     const std::vector<StepTransform> transforms = stepTransforms(points, other);
-    const auto& shape = points.shape.data().shape;
+    const auto& shape = dataOf(points.shape).shape;
     const auto into = [&](const auto& solid) {
         const auto surface = surfaceOf(solid, voxel / other.scale);
         PointSweep sweep(surface, transforms, voxel / other.scale);
@@ -349,7 +350,7 @@ Penetration firstOf(const SweptShape& points, const SweptShape& other, float vox
         }
         return sweep.first();
     };
-    const Penetration first = std::visit(into, other.shape.data().shape);
+    const Penetration first = std::visit(into, dataOf(other.shape).shape);
     const Pose pose = other.at(double(first.time));
     return {first.time, pose.toWorld(other.scale * first.position), pose.rotation * first.normal};
 }

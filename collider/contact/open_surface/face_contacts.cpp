@@ -10,6 +10,7 @@
 #include "collider/contact/body/collider_data.h"
 #include "collider/contact/search/normal_filter.h"
 #include "collider/contact/shapes/nearest_on_triangle.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -32,7 +33,7 @@ void FaceContacts::visitLarge(std::uint32_t triangle) {
     const auto reject = [&](const glm::vec3& centre, float radius) {
         return isOutside(scale * centre, scale * radius + rounding);
     };
-    const SurfacePoints& points = field_.placed.collider.data().points();
+    const SurfacePoints& points = dataOf(field_.placed.collider).points();
     points.visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
         if (point.isInner || isOutside(scale * point.position, rounding)) return;
         if (const auto contact = contactOver(*face, true, index, point))
@@ -59,7 +60,7 @@ void FaceContacts::visitSmall(const std::vector<std::uint32_t>& triangles) {
 }
 
 void FaceContacts::visitSmall(std::uint32_t triangle, TriangleFace& face, const SharpVertex& vertex) {
-    const SurfacePoint& point = field_.placed.collider.data().points().points()[vertex.index];
+    const SurfacePoint& point = dataOf(field_.placed.collider).points().points()[vertex.index];
     const glm::vec3 normal = face.normalFacing(point);
     if (glm::dot(normal, face.corners[0] - vertex.place) > field_.margin) return;
     const float height = face.heightOf(vertex.place), rounding = onFace * field_.spacing;
@@ -86,7 +87,7 @@ std::vector<FaceContacts::SharpVertex> FaceContacts::sharpVerticesNear(
     const auto reject = [&](const glm::vec3& centre, float radius) {
         return glm::any(glm::greaterThan(glm::abs(scale * centre - middle), half + scale * radius));
     };
-    const ColliderData& data = field_.placed.collider.data();
+    const ColliderData& data = dataOf(field_.placed.collider);
     std::vector<SharpVertex> vertices;
     data.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
         if (point.isSharp && !point.isInner && !data.edges().isWithinEdge(data.points(), index))
@@ -133,7 +134,7 @@ bool FaceContacts::reaches(const TriangleFace& face, const glm::vec3& place, con
 /// has come from above both.
 std::optional<Contact> FaceContacts::contactBelowCrease(const TriangleFace& face, std::uint32_t index,
                                                         const glm::vec3& normal, float height) {
-    const SurfacePoint& point = field_.placed.collider.data().points().points()[index];
+    const SurfacePoint& point = dataOf(field_.placed.collider).points().points()[index];
     if (height >= 0 || !height_.isConvexVertex(index, normal)) return std::nullopt;
     const glm::vec3 place = field_.placed.scale * point.position;
     float distance = FaceHeight::distanceAlongAxis(point, normal, height), deepest = height;

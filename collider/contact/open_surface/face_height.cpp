@@ -8,6 +8,7 @@
 #include "collider/contact/body/collider_data.h"
 #include "collider/contact/search/normal_filter.h"
 #include "collider/field/layout/interpolant.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -23,7 +24,7 @@ constexpr float farSide = -0.8f;
 bool FaceHeight::isExact(std::uint32_t index, const glm::vec3& normal, float height,
                          const LocalField::FieldSample& foot) const {
     const Collider& collider = field_.placed.collider;
-    const SurfacePoint& point = collider.data().points().points()[index];
+    const SurfacePoint& point = dataOf(collider).points().points()[index];
     // a foot on the medial axis has no normal: then the normal of the face point decides the side
     const bool isUnclear = foot.where == LocalField::FieldSample::noNormal && !point.isSharp;
     const float facing = glm::dot(foot.normal, normal), required = point.isSharp ? minFacing : 0;
@@ -54,8 +55,8 @@ bool FaceHeight::hasEdgeNearNow(const glm::vec3& place, const glm::vec3& surface
 
 bool FaceHeight::isConvexVertex(std::uint32_t index, const glm::vec3& normal) const {
     const Collider& collider = field_.placed.collider;
-    return collider.data().points().points()[index].isSharp &&
-           collider.data().edges().isConvexVertex(collider.data().points(), index, normal);
+    return dataOf(collider).points().points()[index].isSharp &&
+           dataOf(collider).edges().isConvexVertex(dataOf(collider).points(), index, normal);
 }
 
 float FaceHeight::distanceAlongAxis(const SurfacePoint& vertex, const glm::vec3& normal, float height) {

@@ -13,6 +13,7 @@
 #include "collider/contact/reduction/contact_cache.h"
 #include "collider/contact/reduction/contact_groups.h"
 #include "collider/contact/reduction/first_contacts.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -122,7 +123,7 @@ void reduceFrom(std::size_t first, std::vector<Contact>& contacts, const Pose& a
     std::vector<Contact> found(begin, contacts.end());
     contacts.erase(begin, contacts.end());
     ContactReduction once;
-    ContactReduction& reduction = cache ? cache->data().reduction : once;
+    ContactReduction& reduction = cache ? dataOf(*cache).reduction : once;
     reduction.update(found, a, b, rotation);
     for (const ContactPatch& patch : reduction.reduced().patches)
         contacts.insert(contacts.end(), patch.contacts.begin(), patch.contacts.begin() + patch.count);

@@ -10,6 +10,7 @@
 
 #include "collider/contact/body/collider_data.h"
 #include "collider/contact/search/surface_query.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -28,7 +29,7 @@ class ContactField {
 
     /// The surface near a point in the band, from its sample or from the triangles.
     SurfaceSample inBand(const glm::vec3& point, const Sample& sample) const {
-        return surfaceSampleAt(field_, point, sample, collider_.data().isExactAt(point, exact_));
+        return surfaceSampleAt(field_, point, sample, dataOf(collider_).isExactAt(point, exact_));
     }
 
     /// The same at any point. Outside the band the surface is known up to `maxDistance`, if it is searched for there.
@@ -51,8 +52,8 @@ class ContactField {
     /// The crossing of a sharp edge of another body with one of this body's edges (SharpEdges::crossing()).
     std::optional<SharpEdges::Crossing> crossing(const glm::vec3& from, const glm::vec3& to, const Conormals& conormals,
                                                  const glm::vec3& place, float distance) const {
-        return collider_.data().edges().crossing(collider_.data().points(), from, to, conormals, place, distance,
-                                                 field_.voxelSize());
+        return dataOf(collider_).edges().crossing(dataOf(collider_).points(), from, to, conormals, place, distance,
+                                                  field_.voxelSize());
     }
 
   private:

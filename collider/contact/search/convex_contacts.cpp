@@ -18,6 +18,7 @@
 #include "collider/contact/search/local_field.h"
 #include "collider/contact/search/normal_filter.h"
 #include "collider/contact/search/surface_query.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -55,7 +56,7 @@ struct ConvexInField {
         toConvex = glm::transpose(toField);
         origin = inField.position;
         // the deepest point of an edge is within half its length of one of its ends
-        if (convex.isCurved()) edgeReach += 0.5f * scale * field.collider.data().edges().maxLength();
+        if (convex.isCurved()) edgeReach += 0.5f * scale * dataOf(field.collider).edges().maxLength();
     }
 
     glm::vec3 intoConvex(const glm::vec3& point) const { return toConvex * (point - origin); }
@@ -72,8 +73,8 @@ struct ConvexInField {
 void followEdges(const ConvexInField& body, std::uint32_t index, const NearestPoint& here,
                  std::vector<Contact>& contacts) {
     const Collider& collider = body.local.collider();
-    const auto points = collider.data().points().points();
-    const SharpEdges& edges = collider.data().edges();
+    const auto points = dataOf(collider).points().points();
+    const SharpEdges& edges = dataOf(collider).edges();
     for (const std::uint32_t e : edges.around(index)) {
         const SharpEdge& edge = edges.edges()[e];
         const std::uint32_t next = edge.otherEnd(index);
@@ -138,9 +139,10 @@ class PointsOnConvex {
 
     /// Finds the contacts of all points, and of the sharp edges between them.
     void visit(ContactReport& report, std::vector<Contact>& contacts) const {
-        local_.collider().data().points().visit(
-            [&](const glm::vec3& centre, float radius) { return isFar(centre, radius); },
-            [&](std::uint32_t index, const SurfacePoint& point) { test(index, point, report, contacts); });
+        dataOf(local_.collider())
+            .points()
+            .visit([&](const glm::vec3& centre, float radius) { return isFar(centre, radius); },
+                   [&](std::uint32_t index, const SurfacePoint& point) { test(index, point, report, contacts); });
     }
 
   private:
@@ -266,7 +268,7 @@ class PointsOnConvex {
             end = start + (there - middle) * along;
         } else {
             // Where faces touch, points are exact; next to sharp edges the interpolant is not.
-            const bool isSmooth = local_.collider().data().edges().edges().empty();
+            const bool isSmooth = dataOf(local_.collider()).edges().edges().empty();
             if (!body_.options.exact && !isSmooth)
                 minDistance = touchingFace * body_.scale * local_.collider().field().voxelSize();
             if (!convex_.isFlat(nearest) || nearest.distance < minDistance) return std::nullopt;

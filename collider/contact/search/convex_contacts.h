@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <bilayer/collider/contact.h>
-#include "collider/contact/body/motion.h"
 #include "collider/contact/shapes/convex.h"
 
 namespace bilayer::detail {

@@ -8,6 +8,7 @@
 #include "collider/contact/search/edge_probes.h"
 #include "collider/field/layout/interpolant.h"
 #include "collider/field/layout/path.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -104,7 +105,7 @@ ValueAndSlope EdgeContacts::slopeOf(const Interval& interval, float distance, co
 std::optional<SharpEdges::Crossing> EdgeContacts::crossingAt(const ProbedEdge& edge, float fraction,
                                                              const FieldSample& there) const {
     if (!edge.conormals || edge.radiusAt(fraction) > 0) return std::nullopt;
-    const ColliderData& data = field_.collider().data();
+    const ColliderData& data = dataOf(field_.collider());
     const float scale = field_.scale();
     return data.edges().crossing(data.points(), edge.place(0) / scale, edge.place(1) / scale, *edge.conormals,
                                  edge.place(fraction) / scale, there.distance / scale, field_.voxel() / scale);

@@ -11,6 +11,7 @@
 #include "collider/contact/body/body_transform.h"
 #include "collider/contact/search/contact_field.h"
 #include "collider/contact/search/edge_search.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -26,7 +27,7 @@ class EdgesInField {
     /// @param at, here  the point in the other body's coordinates, and the other surface there
     template <class Found>
     void visit(std::uint32_t index, const glm::vec3& at, const SurfaceSample& here, Found& found) const {
-        const SharpEdges& edges = body_.data().edges();
+        const SharpEdges& edges = dataOf(body_).edges();
         for (const std::uint32_t e : edges.around(index)) {
             const SharpEdge& edge = edges.edges()[e];
             const std::uint32_t next = edge.otherEnd(index);
@@ -45,7 +46,7 @@ class EdgesInField {
                 const SurfacePoint &a = pointOf(index), &b = pointOf(next);
                 const SurfacePoint between{glm::mix(a.position, b.position, part), glm::normalize(a.normal + b.normal),
                                            true};
-                found(std::uint32_t(body_.data().points().points().size()) + e, between, deepest->sample);
+                found(std::uint32_t(dataOf(body_).points().points().size()) + e, between, deepest->sample);
             }
         }
     }
@@ -86,7 +87,7 @@ class EdgesInField {
         return EdgeContact{lowest->place, *across};
     }
 
-    const SurfacePoint& pointOf(std::uint32_t index) const { return body_.data().points().points()[index]; }
+    const SurfacePoint& pointOf(std::uint32_t index) const { return dataOf(body_).points().points()[index]; }
 
     const Collider& body_;
     const BodyTransform& transform_;

@@ -9,6 +9,7 @@
 
 #include "collider/contact/body/collider_data.h"
 #include "collider/contact/search/local_field.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -33,7 +34,7 @@ ContactReport collideHalfSpace(const HalfSpace& solid, const Motion& motion, con
     const auto reject = [&](const glm::vec3& centre, float radius) {
         return above(centre) - radius > reach + local.maxDisplacement() / field.scale;
     };
-    field.collider.data().points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
+    dataOf(field.collider).points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
         ++report.pointsTested;
         const float distance = above(point.position);
         // the points of the plane approach this one
@@ -42,8 +43,8 @@ ContactReport collideHalfSpace(const HalfSpace& solid, const Motion& motion, con
         const glm::vec3 position = field.pose.toWorld(field.scale * point.position);
         contacts.push_back({position, -normal, field.scale * distance, index | featureOfB, field.scale * approach, 0});
     });
-    if (!options.exact || !field.collider.data().body.mesh) return report;
-    const auto& vertices = field.collider.data().body.mesh->points;
+    if (!options.exact || !dataOf(field.collider).body.mesh) return report;
+    const auto& vertices = dataOf(field.collider).body.mesh->points;
     const auto isLower = [&](const glm::vec3& a, const glm::vec3& b) { return above(a) < above(b); };
     const auto lowest = std::min_element(vertices.begin(), vertices.end(), isLower);
     if (above(*lowest) <= reach)

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include <bilayer/collider/contact.h>
-#include <bilayer/collider/shapes.h>
-#include "collider/contact/body/motion.h"
+#include "collider/contact/shapes/shape_data.h"
 
 namespace bilayer::detail {
 

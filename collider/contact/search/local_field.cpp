@@ -10,6 +10,7 @@
 
 #include "collider/contact/search/surface_query.h"
 #include "collider/field/layout/interpolant.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -33,7 +34,7 @@ LocalField::FieldSample LocalField::at(const glm::vec3& point, float radius) con
     if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return sampleBeyondBand(point, radius, sample.distance);
     if (!sample.inBand)
         return {sample.distance > 0 ? FieldSample::outside : FieldSample::inside, scale_ * sample.distance};
-    if (scale_ * sample.distance - radius <= exactReach_ && collider_.data().isExactAt(point / scale_, exact_))
+    if (scale_ * sample.distance - radius <= exactReach_ && dataOf(collider_).isExactAt(point / scale_, exact_))
         return exactSample(point, sample);
     const glm::vec3 normal = directionOf(sample, field_.voxelSize());
     const auto where = normal == glm::vec3(0) ? FieldSample::noNormal : FieldSample::nearSurface;

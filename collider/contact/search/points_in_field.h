@@ -21,6 +21,7 @@
 #include "collider/contact/search/sampled_points.h"
 #include "collider/field/layout/interpolant.h"
 #include "collider/field/samples/field_data.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -35,7 +36,7 @@ class PointsInField {
           transform_(body, other),
           coarse_(transform_.intoCoarseCells(field())),
           relativeMotion_(body.pose, body.motion, other.pose, other.motion),
-          clearance_(field().data().coarse),
+          clearance_(dataOf(field()).coarse),
           options_(options),
           reach_(options.margin / other.scale) {
         const Bounds &bounds = body.collider.bounds(), &otherBounds = other.collider.bounds();
@@ -71,7 +72,7 @@ class PointsInField {
     void visitFound(std::span<const FoundPoint> points, ContactReport& report, Found&& found) const {
         for (const auto& [index, sample] : points) {
             ++report.pointsTested;
-            const SurfacePoint& point = body_.collider.data().points().points()[index];
+            const SurfacePoint& point = dataOf(body_.collider).points().points()[index];
             test(index, point, transform_(point.position), sample, report, found);
         }
     }
@@ -121,7 +122,7 @@ class PointsInField {
         const auto reject = [&](const glm::vec3& centre, float radius) {
             return clearance_.isOutside(coarse_(centre), radius * coarse_.scale + kept(centre, radius));
         };
-        body_.collider.data().points().visit(reject, visit);
+        dataOf(body_.collider).points().visit(reject, visit);
     }
 
     template <class Found>
@@ -160,7 +161,7 @@ class PointsInField {
 
     template <class Found>
     void visitListed(const CandidateLists::List& candidates, ContactReport& report, Found& found) {
-        const auto points = body_.collider.data().points().points();
+        const auto points = dataOf(body_.collider).points().points();
         for (const std::uint32_t index : candidates.points()) {
             const SurfacePoint& point = points[index];
             if (clearance_.isAbove(coarse_(point.position), reach_)) continue;

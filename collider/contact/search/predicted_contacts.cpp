@@ -6,6 +6,7 @@
 
 #include "collider/contact/body/collider_data.h"
 #include "collider/contact/search/surface_query.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -45,7 +46,7 @@ std::optional<SurfaceSample> surfaceAt(const SteppedBody& of, const SurfaceSampl
         const glm::vec3 at = body.pose.toBody(point) / body.scale;
         const Sample sample = field.sample(at);
         if (!sample.inBand) return std::nullopt;
-        return surfaceSampleAt(field, at, sample, body.collider.data().isExactAt(at));
+        return surfaceSampleAt(field, at, sample, dataOf(body.collider).isExactAt(at));
     };
     // at the height of the contact, since thin walls have another side deeper down
     const float rise = glm::dot(contact.normal, nearby - place);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <bilayer/collider/query.h>
+#include <bilayer/sdf/level_set.h>
 #include "collider/field/layout/field_layout.h"
 
 namespace bilayer::detail {
@@ -62,6 +63,7 @@ class FoundPoints {
 
     std::vector<FoundPoint> points;     ///< grouped by query
     std::vector<std::uint32_t> begins;  ///< the first point of each query, and the end
+    DeviceTimes times;                  ///< of the batch
 };
 
 /// What a PointSampler holds.

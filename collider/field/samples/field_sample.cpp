@@ -19,6 +19,7 @@
 #include "collider/field/samples/sample_cell.h"
 #include "collider/field/samples/sample_place.h"
 #include "collider/field/samples/sample_vectors.h"
+#include "sdf/base/access.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
@@ -302,7 +303,7 @@ Sample Field::sampleWithin(const glm::vec3& point, float reach) const noexcept {
 }
 
 FieldSampler::FieldSampler(const Field& field) noexcept
-    : data_(&field.data()), sampleInBand_(data_->kernels.sampleInBand) {}
+    : data_(&dataOf(field)), sampleInBand_(data_->kernels.sampleInBand) {}
 
 Sample FieldSampler::sampleAnywhere(const glm::vec3& point) const noexcept {
     return data_->kernels.samplePoint(*data_, point);

@@ -25,6 +25,7 @@
 #include <bilayer/integration/bullet/shape.h>
 #include "collider/contact/shapes/shape_data.h"
 #include "integration/bullet/detail/convert.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::bullet::detail {
 
@@ -182,10 +183,12 @@ OpenSurface openSurfaceOf(const btConcaveShape& shape) {
 ContactShape contactShapeOf(const btCollisionShape& shape) {
     const int type = shape.getShapeType();
     if (type == FAST_CONCAVE_MESH_PROXYTYPE) return ContactShape(static_cast<const Shape&>(shape).collider());
-    if (shape.isConvex()) return ContactShape(ContactShapeData{convexOf(static_cast<const btConvexShape&>(shape))});
+    if (shape.isConvex())
+        return makeOf<ContactShape>(ContactShapeData{convexOf(static_cast<const btConvexShape&>(shape))});
     if (type == STATIC_PLANE_PROXYTYPE) {
         const auto& plane = static_cast<const btStaticPlaneShape&>(shape);
-        return ContactShape(ContactShapeData{HalfSpace{toGlm(plane.getPlaneNormal()), plane.getPlaneConstant()}});
+        return makeOf<ContactShape>(
+            ContactShapeData{HalfSpace{toGlm(plane.getPlaneNormal()), plane.getPlaneConstant()}});
     }
     return ContactShape::triangles(openSurfaceOf(static_cast<const btConcaveShape&>(shape)));
 }
@@ -196,7 +199,7 @@ ConvexShape::ConvexShape(const btConvexShape& shape)
       margin_(shape.getMargin()),
       vertexCount_(vertexCountOf(shape)),
       bounds_(boundsOf(shape)),
-      contactShape_(ContactShapeData{convexOf(shape)}) {}
+      contactShape_(makeOf<ContactShape>(ContactShapeData{convexOf(shape)})) {}
 
 bool ConvexShape::represents(const btConvexShape& shape) const {
     return shape_ == &shape && scaling_ == shape.getLocalScaling() && margin_ == shape.getMargin() &&

@@ -8,6 +8,7 @@
 #include <exception>
 
 #include "integration/bullet/detail/warning.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::bullet::detail {
 
@@ -17,6 +18,7 @@ void SampledPairs::clear() {
     bodies_.clear();
     places_.clear();
     queries_.clear();
+    found_.times = {};
 }
 
 std::uint32_t SampledPairs::placeOf(const Collider& collider) {
@@ -38,7 +40,7 @@ std::optional<std::size_t> SampledPairs::add(const Placed& a, const Placed& b, f
 bool SampledPairs::sample() {
     if (queries_.empty()) return true;
     try {
-        sampler_.data().sample(bodies_, queries_, found_);
+        dataOf(sampler_).sample(bodies_, queries_, found_);
         return true;
     } catch (const std::exception& error) {
         warn(fmt::format("{} failed to sample contacts, and the processor finds them instead: {}", sampler_.device(),

@@ -39,6 +39,8 @@ class SampledPairs {
     /// @return whether it succeeded
     bool sample();
 
+    /// What the device took for the batch.
+    const DeviceTimes& times() const { return found_.times; }
     std::size_t size() const { return queries_.size() / 2; }
     std::span<const FoundPoint> ofA(std::size_t pair) const { return found_.of(2 * pair); }
     std::span<const FoundPoint> ofB(std::size_t pair) const { return found_.of(2 * pair + 1); }

@@ -19,6 +19,7 @@
 #include "integration/bullet/detail/leaf_shapes.h"
 #include "integration/bullet/detail/pair_contacts.h"
 #include "integration/bullet/detail/velocity.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::bullet::detail {
 
@@ -89,7 +90,7 @@ float edgeAngleUnder(const btRigidBody& body, const btCollisionObject& ground) {
 
 /// The maximum angle at the smooth edges of a field's triangle at a place, in the axes of its shape [rad].
 float edgeAngleOf(const Shape& field, const btVector3& place) {
-    const ColliderData& data = field.collider().data();
+    const ColliderData& data = dataOf(field.collider());
     const Placed placed = field.placed(btTransform::getIdentity());
     const glm::vec3 inField = glm::conjugate(placed.pose.rotation) * (toGlm(place) - placed.pose.position);
     return data.body.mesh ? smoothEdgeAngleAt(data.meshTree(), inField / placed.scale) : 0;
