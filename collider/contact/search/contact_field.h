@@ -5,6 +5,7 @@
 
 #include <bilayer/collider/contact.h>
 
+#include <algorithm>
 #include <glm/geometric.hpp>
 #include <optional>
 
@@ -13,6 +14,13 @@
 #include "sdf/base/access.h"
 
 namespace bilayer::detail {
+
+/// How far a straight edge between two surface points of a body lies over the body's triangles at a place. Exact
+/// contacts are between the triangles. In the body's units.
+inline float edgeHeight(const Collider& collider, const glm::vec3& place) {
+    const ClosestPoint closest = collider.exactField().closest(place, collider.field().voxelSize());
+    return closest.found ? std::max(closest.distance, 0.f) : 0;
+}
 
 class ContactField {
   public:
@@ -25,6 +33,8 @@ class ContactField {
           beyondBand_(beyondBand) {}
 
     const Field& field() const { return field_; }
+    const Collider& collider() const { return collider_; }
+    bool isExact() const { return exact_; }  ///< as the constructor's argument
     float voxelSize() const { return field_.voxelSize(); }
 
     /// The surface near a point in the band, from its sample or from the triangles.

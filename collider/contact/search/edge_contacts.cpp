@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "collider/contact/body/collider_data.h"
+#include "collider/contact/search/contact_field.h"
 #include "collider/contact/search/edge_probes.h"
 #include "collider/field/layout/interpolant.h"
 #include "collider/field/layout/path.h"
@@ -85,8 +86,10 @@ std::optional<Contact> EdgeContacts::deepest(const ProbedEdge& edge, float from,
     const FieldSample here = sampleAt(edge, fraction);
     if (const auto crossing = crossingAt(edge, fraction, here)) {
         const float scale = field_.scale();
-        if (scale * crossing->distance > margin_) return std::nullopt;
-        return field_.contact(scale * crossing->position, crossing->normal, scale * crossing->distance, 0,
+        const float height = field_.isExact() ? edgeHeight(field_.collider(), crossing->position) : 0;
+        const float distance = scale * (crossing->distance + height);
+        if (distance > margin_) return std::nullopt;
+        return field_.contact(scale * crossing->position, crossing->normal, distance, 0,
                               field_.approach(edge.place(fraction), crossing->normal, margin_));
     }
     if (!fallsBetween(first, last) || here.where != FieldSample::nearSurface) return std::nullopt;

@@ -41,11 +41,14 @@ class EdgesInField {
             if (std::max(sample.distance, there->distance) <= reach_ && next < index) continue;
             const ValueAndSlope from = slopeAlong(along, 0, here), to = slopeAlong(along, length, *there);
             if (!mayBeDeeperBetween(from, to)) continue;
-            if (const auto deepest = deepestOf(at, end, along, from, to, edge.conormals)) {
+            if (auto deepest = deepestOf(at, end, along, from, to, edge.conormals)) {
                 const float part = deepest->place / length;
                 const SurfacePoint &a = pointOf(index), &b = pointOf(next);
                 const SurfacePoint between{glm::mix(a.position, b.position, part), glm::normalize(a.normal + b.normal),
                                            true};
+                if (other_.isExact())
+                    deepest->sample.distance += transform_.scale * edgeHeight(body_, between.position);
+                if (deepest->sample.distance > reach_) continue;
                 found(std::uint32_t(dataOf(body_).points().points().size()) + e, between, deepest->sample);
             }
         }
@@ -77,13 +80,14 @@ class EdgesInField {
 
         const Conormals rotated{transform_.rotated(conormals[0]), transform_.rotated(conormals[1])};
         if (const auto crossing = other_.crossing(start, end, rotated, start + lowest->place * along, here->distance)) {
-            if (crossing->distance > reach_) return std::nullopt;
             const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
-            return EdgeContact{glm::dot(onEdge - start, along), SurfaceSample{crossing->distance, crossing->normal}};
+            const float height = other_.isExact() ? edgeHeight(other_.collider(), crossing->position) : 0;
+            return EdgeContact{glm::dot(onEdge - start, along),
+                               SurfaceSample{crossing->distance + height, crossing->normal}};
         }
         if (!fallsBetween(from, to)) return std::nullopt;
         const auto across = acrossEdge(along, *here, lowest->place, other_.voxelSize(), sampleAt);
-        if (!across || across->distance > reach_) return std::nullopt;
+        if (!across) return std::nullopt;
         return EdgeContact{lowest->place, *across};
     }
 

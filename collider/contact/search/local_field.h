@@ -22,6 +22,7 @@ class LocalField {
     LocalField(const Placed& field, const Pose& other, const Motion& motion, float reach, bool exact);
 
     const Collider& collider() const { return collider_; }
+    bool isExact() const { return exact_; }  ///< as the constructor's argument
     /// From the field's units to metres.
     float scale() const { return scale_; }
     float voxel() const { return voxel_; }  ///< [m]
