@@ -32,7 +32,9 @@ std::uint64_t mortonCode(const glm::uvec3& voxel) {
 std::vector<glm::vec3> alongCurve(const std::vector<glm::vec3>& points, const Field& field) {
     std::vector<std::pair<std::uint64_t, glm::vec3>> keyed;
     for (const glm::vec3& p : points)
-        keyed.emplace_back(mortonCode(glm::uvec3((glm::dvec3(p) - field.origin()) / double(field.voxelSize()))), p);
+        keyed.emplace_back(mortonCode(glm::uvec3(glm::max(
+                               (glm::dvec3(p) - glm::dvec3(field.bounds().lower)) / double(field.voxelSize()), 0.))),
+                           p);
     std::sort(keyed.begin(), keyed.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<glm::vec3> sorted;
     for (const auto& [code, point] : keyed) sorted.push_back(point);

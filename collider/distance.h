@@ -101,8 +101,8 @@ struct Impact {
 /// When two bodies touch that move from their poses by their motions. Both motions take the same time; positions change
 /// at constant velocities, and rotations about the pose positions at constant angular velocities.
 ///
-/// The bodies do not touch before, whatever their speed and however thin they are. The fraction found may be early by
-/// the time in which they approach by the tolerance: bodies that pass each other within it count as touching.
+/// The bodies do not touch before, whatever their speed and however thin they are. At the time found they are as near
+/// as the tolerance, or touch: bodies that pass each other within the tolerance count as touching.
 /// Bodies that are as near as the tolerance at the start, or overlap, touch at the start, in whatever direction they
 /// move.
 ///
@@ -115,9 +115,9 @@ struct Impact {
 ///
 /// With ImpactOptions::penetration, points of either body are followed along their paths through the other one: the
 /// surface points of a collider, the vertices and edges of other shapes. A point penetrates where it gets more than a
-/// third of the smaller voxel into the other body, or, if it starts in contact, deeper than it starts by up to 0.1
-/// voxels. The bodies are then at most half a voxel before the place where it enters. No triangles are needed; what
-/// passes between surface points is not seen.
+/// third of the smaller voxel into the other body. One that starts in contact may get deeper by 0.02 to 0.1 voxels, the
+/// less the deeper it starts. The bodies are then at most half a voxel before the place where it enters. No triangles
+/// are needed; what passes between surface points is not seen.
 Impact timeOfImpact(const Placed& a, const Placed& b, const ImpactOptions& options = {});
 
 /// The same for two shapes, at least one of them a collider. Throws std::invalid_argument also if neither is, and for a

@@ -15,6 +15,7 @@ using namespace detail;
 
 FieldData::FieldData(const LevelSet& levelSet, Storage storage)
     : FieldLayout(levelSet, storage),
+      worldOrigin(levelSet.origin()),
       kernels(sampleKernels(storage)),
       coarse(clearance()),
       signedByNormals(levelSet.sign() == nameOf(Sign::normals)),
@@ -55,7 +56,7 @@ Field::Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options)
 Field::Field(std::shared_ptr<const FieldData> data) : data_(std::move(data)), sample_(data_->kernels.samplePoint) {}
 
 glm::dvec3 Field::origin() const noexcept {
-    return data_->origin;
+    return data_->worldOrigin;
 }
 
 float Field::voxelSize() const noexcept {

@@ -154,7 +154,8 @@ class Field {
     /// overlapsBox() of each box.
     void overlapsBox(std::span<const OrientedBox> boxes, std::span<bool> answers) const;
 
-    glm::dvec3 origin() const noexcept;     ///< lower corner of the box around the band [m]
+    /// As LevelSet::origin(): the point of the world that is zero in the field's coordinates [m].
+    glm::dvec3 origin() const noexcept;
     float voxelSize() const noexcept;       ///< [m]
     float exteriorWidth() const noexcept;   ///< [m]
     float interiorWidth() const noexcept;   ///< [m]

@@ -29,8 +29,8 @@ namespace {
 
 /// The default tolerance [voxels], and the minimum of any tolerance [sizes of the larger body].
 constexpr double defaultTolerance = 0.05, minTolerance = 1e-5;
-/// Limit of distances in a search. Bodies that slide past each other at hardly more than the tolerance need one each
-/// time they have moved by their separation, and the length of their paths has no limit.
+/// Max count of distances in a search. Bodies that slide past each other at hardly more than the tolerance need one for
+/// each separation that they travel.
 constexpr int maxDistances = 10000;
 /// A body that rotates by more has no motion of one step [rad].
 constexpr float maxMotionRotation = 1000;

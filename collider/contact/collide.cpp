@@ -31,10 +31,10 @@ glm::vec3 contactNormal(const Placed& other, const SurfaceSample& sample, const 
     return sample.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * sample.normal;
 }
 
-// A point's plane crosses an edge if the normal of the other surface changes by more than this angle (cosine of 25
-// degrees) up to this distance beyond the point [voxels]. Samples are too smooth within a voxel of an edge, which
-// is 1.4 voxels from a corner. A voxel above the surface, the normal changes by 25 degrees half a voxel later.
-// Elsewhere samples are better than the normals of facets.
+// A point's plane crosses an edge if the normal of the other surface changes by more than the angle of this cosine (25
+// degrees) within `beyondEdge` of the point [voxels]. Samples are too smooth within a voxel of an edge, which is 1.4
+// voxels from a corner; a voxel above the surface, the normal changes half a voxel later. Elsewhere samples are better
+// than the normals of facets.
 constexpr float sharpCosine = 0.9f, beyondEdge = 2;
 
 // The outward normals of a body's surface near places in the world; zero where they are unknown.

@@ -53,7 +53,7 @@ void visitOutline(const Field& field, int axis, Line&& line) {
 
 void drawBand(const Shape& shape, const Placed& here, btIDebugDraw& drawer, const btVector3& colour) {
     const Field& field = shape.collider().field();
-    const glm::vec3 origin(field.origin());
+    const glm::vec3 origin(dataOf(field).origin);
     const float edge = float(FieldFrame::side) * field.voxelSize();
     const auto place = [&](const glm::ivec3& corner) {
         return toBullet(here.pose.toWorld(here.scale * (origin + edge * glm::vec3(corner))));

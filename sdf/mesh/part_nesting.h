@@ -49,11 +49,11 @@ class PartNesting {
     }
 
   private:
-    /// The containers of a part: the innermost one, those that it inherits from the innermost one, some more or fewer,
-    /// and its own, which nothing within the part inherits.
+    /// The containers of a part: the innermost one and its containers, with differences.
     struct Containers {
         unsigned innermost = noPart;
-        std::vector<unsigned> added, removed, own;
+        std::vector<unsigned> added, removed;  ///< to and from those of the innermost one
+        std::vector<unsigned> own;             ///< more, which parts within this one do not inherit
     };
     /// What the parts within a part inherit from it.
     struct Heritage {

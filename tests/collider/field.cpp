@@ -71,6 +71,16 @@ std::vector<glm::vec3> pointsAround(Random& random, std::size_t count) {
 
 }  // namespace
 
+TEST_CASE("a field far from the zero point says where its coordinates begin, with its mesh and without") {
+    Mesh mesh = shapes::box({1, 1, 1});
+    mesh.origin = {5e6, -3e5, 100};
+    const LevelSet levelSet = build(mesh, {.voxelSize = 0.1f});
+    CHECK(Field(levelSet).origin() == mesh.origin);
+    CHECK(Field(levelSet, mesh).origin() == mesh.origin);
+    CHECK(Collider(mesh, levelSet).exactField().origin() == mesh.origin);
+    CHECK(Field(levelSet).distance({0, 0, 0}) < 0);
+}
+
 TEST_CASE("in the band a sample is OpenVDB's trilinear interpolation, and only there it is in the band") {
     checkInBand(makeField);
 }
@@ -95,7 +105,7 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
         for (int i = 0; i < 20000; ++i) {
             const glm::vec3 p = random.point(i % 4 ? 0.6 : 3);
             const auto radius = float(random(0, 0.3)), reach = float(random(-2, 2) * h);
-            const glm::vec3 place = glm::vec3(glm::dvec3(p) - field.origin()) / edge;
+            const glm::vec3 place = glm::vec3(glm::dvec3(p) - dataOf(field).origin) / edge;
             const double truth = solid.distance(glm::dvec3(p));
             const Sample sample = field.sample(p);
             CAPTURE(p.x, p.y, p.z, truth, radius, reach);
@@ -195,7 +205,7 @@ TEST_CASE("a field sampler's samples are the field's, whatever block it keeps") 
         }
         // the corners of voxels and blocks, one float below and above
         for (int i = 0; i < 5000; ++i) {
-            glm::vec3 p(field.origin() + h * glm::round(glm::dvec3(random.point(30)) + 30.));
+            glm::vec3 p(dataOf(field).origin + h * glm::round(glm::dvec3(random.point(30)) + 30.));
             for (int axis = 0; axis < 3; ++axis) {
                 const float way = i % 3 == 0 ? 0.f : i % 3 == 1 ? -infinity : infinity;
                 if (way != 0) p[axis] = std::nextafter(p[axis], way);

@@ -14,7 +14,7 @@ FOLDERS = ["sdf", "collider", "cl", "integration", "tools", "demos", "bench", "t
 # comments and texts, which may hold braces
 IGNORED = re.compile(r"//[^\n]*|R\"(\w*)\(.*?\)\1\"|\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])'", re.DOTALL)
 TYPE = re.compile(r"\b(?:class|struct)\s+(?:alignas\([^)]*\)\s*)?([\w:]+)(?:\s+final)?\s*(?::[^;{]*)?\{")
-MEMBER = re.compile(r"\n[^\n;{}()#]*?\b([A-Z]\w+)::(?:~?\w+|operator\S+)\([^;{}]*\)[^;{}]*(?::[^;]*?)?\{")
+MEMBER = re.compile(r"\n[^\n;{}()#]*?\b((?:[A-Z]\w+::)*[A-Z]\w+)::(?:~?\w+|operator\S+)\([^;{}]*\)[^;{}]*(?::[^;]*?)?\{")
 
 
 def end_of_body(text, start):
@@ -44,6 +44,10 @@ def main():
             for found in MEMBER.finditer(text):
                 members[(folder, found.group(1))] += lines(text, found.start() + 1, found.end() - 1)
     assert len(bodies) > 500, "classes are not found"
+    # members of a class that is defined within another one
+    for (folder, name), count in list(members.items()):
+        if (folder, name) not in bodies:
+            members[folder, name.rsplit("::", 1)[-1]] += count
     limits = {name: LONGER.get(name, MAX_LINES) for name in bodies}
     long = {name: count + members[name] for name, count in bodies.items() if count + members[name] > limits[name]}
     for name, count in sorted(long.items()):

@@ -28,8 +28,8 @@ inline const std::map<std::string, std::vector<std::string>> floors{
     {"integration/fluid", {"detail"}},
 };
 
-/// The lowest private folder that may include a public header: the one whose code the header's functions need. No
-/// private folder may include a public header that is not listed.
+/// The lowest private folder that may include a public header, for its types. No private folder may include a public
+/// header that is not listed.
 inline const std::map<std::string, std::string> publicFloors{
     {"sdf/options.h", "base"},
     {"sdf/mesh.h", "base"},
@@ -56,7 +56,8 @@ inline const std::vector<std::string> folders{"sdf",   "cl",    "collider", "int
                                               "tools", "demos", "bench",    "tests"};
 
 inline bool isSource(const fs::path& path) {
-    static const std::set<std::string> extensions{".h", ".cpp", ".cl", ".py", ".sh", ".js", ".html", ".cmake", ".txt"};
+    static const std::set<std::string> extensions{".h",  ".cpp", ".cl",   ".py",    ".pyi",
+                                                  ".sh", ".js",  ".html", ".cmake", ".txt"};
     return extensions.count(path.extension().string()) > 0;
 }
 

@@ -14,7 +14,7 @@ using namespace bilayer::test;
 
 namespace {
 
-// The namespace that stands in a text up to a position, as it is written in its last line that opens one there.
+// The namespace of the project that a text is in at a position, as it is written in the last line that opens one there.
 std::string namespaceAt(const std::string& text, std::size_t position) {
     const std::string opening = "\nnamespace ";
     const std::size_t found = text.rfind(opening, position);
@@ -80,6 +80,26 @@ TEST_CASE("no two types of one namespace have one name in the headers of all lib
         }
     CHECK(wrong == "");
     CHECK(files.size() > 200);
+}
+
+TEST_CASE("what stands in a private folder of a library is in a detail namespace") {
+    std::string wrong;
+    std::size_t count = 0;
+    for (const std::string& library : librariesAnd({}))
+        for (const std::string& file : codeIn(library)) {
+            if (!file.ends_with(".h") || file.find('/', library.size() + 1) == std::string::npos) continue;
+            const std::string text = contents(file);
+            static const std::regex opening(R"re(\nnamespace (bilayer[\w:]*) \{\n([^}]*))re");
+            static const std::regex declarations(R"re((\s*(struct|class) \w+;)*\s*)re");
+            for (std::sregex_iterator found(text.begin(), text.end(), opening), last; found != last; ++found) {
+                ++count;
+                const bool isDetail = (*found)[1].str().find("::detail") != std::string::npos;
+                const bool isDeclared = std::regex_match((*found)[2].str(), declarations);
+                if (!isDetail && !isDeclared) wrong += file + " opens " + (*found)[1].str() + "\n";
+            }
+        }
+    CHECK(wrong == "");
+    CHECK(count > 200);
 }
 
 TEST_CASE("types with a body are found, and declarations are none") {

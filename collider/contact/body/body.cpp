@@ -21,6 +21,7 @@
 #include "collider/contact/body/stored_mesh.h"
 #include "collider/contact/body/stored_points.h"
 #include "collider/field/samples/field_data.h"
+#include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/base/quoted_text.h"
 #include "sdf/io/input_file.h"
@@ -167,7 +168,7 @@ std::shared_ptr<const Mesh> meshOf(const LevelSet& levelSet) {
 
 // A mesh that build() neither reoriented nor repaired is stored as it was given.
 void requireMeshOf(const LevelSet& levelSet, const Mesh& mesh) {
-    const bool asGiven = levelSet.sign() == "normals" && levelSet.signReason() == closedAndOriented;
+    const bool asGiven = levelSet.sign() == nameOf(Sign::normals) && levelSet.signReason() == closedAndOriented;
     if (!asGiven || levelSet.meshHash() == 0) return;
     if (const std::uint64_t its = hash(mesh); its != levelSet.meshHash())
         refuseBody(fmt::format("'{}' is {:016x}, but the hash of its mesh is {:016x}", metadata::meshHash,

@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "collider/field/samples/field_data.h"
+#include "sdf/base/access.h"
 
 namespace bilayer::detail {
 
@@ -47,7 +48,7 @@ struct BodyTransform {
         BodyTransform transform = *this;
         transform.scale /= edge;
         transform.linear *= 1 / edge;
-        transform.shift = glm::vec3((glm::dvec3(shift) - field.origin()) / double(edge));
+        transform.shift = glm::vec3((glm::dvec3(shift) - dataOf(field).origin) / double(edge));
         return transform;
     }
 };

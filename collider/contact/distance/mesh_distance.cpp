@@ -44,10 +44,10 @@ unsigned boundDistances(const OrientedBounds& box, const OrientedBoxes& group, c
                         const glm::dvec3& direction, double limit2, double (&bounds2)[treeWidth]) {
     const hn::CappedTag<double, treeWidth> tag;
     const hn::Rebind<float, decltype(tag)> floats;
-    const glm::dmat3 toGroup = glm::transpose(frame.axes), turned = toGroup * box.axes;
+    const glm::dmat3 toGroup = glm::transpose(frame.axes), rotated = toGroup * box.axes;
     const glm::dvec3 centre = toGroup * (box.centre - frame.origin);
     glm::dvec3 half(0);
-    for (int j = 0; j < 3; ++j) half += glm::abs(turned[j]) * box.half[j];
+    for (int j = 0; j < 3; ++j) half += glm::abs(rotated[j]) * box.half[j];
     const glm::dvec3 ahead = toGroup * direction;
     const double reachAhead = glm::dot(glm::abs(direction * box.axes), box.half);
     unsigned near = 0;
@@ -76,7 +76,7 @@ unsigned boundDistances(const OrientedBounds& box, const OrientedBoxes& group, c
         for (int j = 0; j < 3; ++j) {
             auto along = zero, reach = hn::Set(tag, box.half[j]);
             for (std::size_t k = 0; k < 3; ++k) {
-                const auto cosine = hn::Set(tag, turned[j][int(k)]);
+                const auto cosine = hn::Set(tag, rotated[j][int(k)]);
                 along = hn::Add(along, hn::Mul(cosine, middle[k]));
                 reach = hn::Add(reach, hn::Mul(hn::Abs(cosine), extent[k]));
             }

@@ -27,8 +27,8 @@ namespace {
 // Depth of the test points inside their own body [voxels]. Contacts handle shallower penetration, so that a body that
 // slides along another one is not stopped.
 constexpr float testDepth = 0.25f;
-// A point that starts inside may get deeper in a step, so that a body slides on at its depth: up to this depth, but by
-// at least and at most this much [voxels]. A fixed amount would add up from step to step.
+// A point that starts inside may get as deep as `maxStartDepth`, so that a body slides on at its depth. It may always
+// get deeper by `minDeepening`, and never by more than `maxDeepening` in a step [voxels]: more would add up over steps.
 constexpr float maxStartDepth = 0.45f, minDeepening = 0.02f, maxDeepening = 0.1f;
 // Maximum depth of a surface point below the plane where its test point enters [voxels].
 constexpr float maxDepth = testDepth + maxDeepening;
@@ -225,8 +225,8 @@ class PointSweep {
         return {glm::distance(from, to), depthBelow(entry, from, radius), depthBelow(entry, to, radius)};
     }
 
-    /// When a body stops whose test point enters on a chord: when the point itself touches, if that is not far back.
-    /// Before the chord the path has another direction.
+    /// The time at which a body stops if its test point enters on this chord: the time at which the point itself
+    /// touches, if that is not far back. Before the chord the path has another direction.
     /// @param touching  depth of the test point then
     /// @param lead      height of the test point above the surface at its start, if it was moved back to that
     float stoppingTime(std::size_t chordIndex, const Chord& chord, float touching, float lead) const {

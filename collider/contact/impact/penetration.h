@@ -36,8 +36,8 @@ struct Penetration {
     Penetration reversed() const { return {time, position, -normal}; }
 };
 
-/// The earlier of two penetrations of the same bodies. Of two at one moment, as where an edge meets a face, the one
-/// that opposes the motion more, so that the answer does not depend on the order of bodies or parts.
+/// Returns the earlier of two penetrations of the same bodies. If both are at the same time, as where an edge meets a
+/// face, returns the one whose normal opposes the motion more. So the order of bodies and parts does not matter.
 /// @param motion  relativeDisplacement() of the bodies [m]
 inline Penetration earlier(const Penetration& one, const Penetration& other, const glm::vec3& motion) {
     if (one.time != other.time) return other.time < one.time ? other : one;

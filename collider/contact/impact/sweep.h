@@ -29,11 +29,11 @@ class Sweep {
     static Sweep between(const Pose& start, const Pose& end) {
         Sweep sweep(start, {});
         sweep.displacement_ = glm::dvec3(end.position) - sweep.start_;
-        glm::dquat turn = glm::normalize(glm::dquat(end.rotation)) * glm::conjugate(sweep.orientation_);
-        if (turn.w < 0) turn = -turn;
-        const glm::dvec3 axis(turn.x, turn.y, turn.z);
+        glm::dquat rotation = glm::normalize(glm::dquat(end.rotation)) * glm::conjugate(sweep.orientation_);
+        if (rotation.w < 0) rotation = -rotation;
+        const glm::dvec3 axis(rotation.x, rotation.y, rotation.z);
         const double sine = glm::length(axis);
-        if (sine > 0) sweep.rotation_ = 2 * std::atan2(sine, turn.w) / sine * axis;
+        if (sine > 0) sweep.rotation_ = 2 * std::atan2(sine, rotation.w) / sine * axis;
         return sweep;
     }
 

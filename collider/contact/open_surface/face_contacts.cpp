@@ -130,8 +130,8 @@ bool FaceContacts::reaches(const TriangleFace& face, const glm::vec3& place, con
     return !face.isOutside(place - height / approach * field_.local.relativeMotion().of(foot), onFace * field_.spacing);
 }
 
-/// The contact of a convex vertex that has penetrated an open surface next to a crease and is over neither triangle: it
-/// has come from above both.
+/// The contact of a convex vertex that has penetrated an open surface next to a crease. It lies over neither triangle,
+/// and entered from above both.
 std::optional<Contact> FaceContacts::contactBelowCrease(const TriangleFace& face, std::uint32_t index,
                                                         const glm::vec3& normal, float height) {
     const SurfacePoint& point = dataOf(field_.placed.collider).points().points()[index];

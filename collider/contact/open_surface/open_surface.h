@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Open surfaces: two-sided triangles that come one at a time. Edges with equal end points are shared.
+// Open surfaces: two-sided triangles, which a callback passes one at a time. Edges with equal end points are one edge.
 // Tested by tests/bullet/open_surface.cpp through collideTriangles().
 #pragma once
 

@@ -25,7 +25,7 @@ inline bool reachesBeyondBand(const Placed& body, float margin, ContactRange ran
 }
 
 /// The contacts of two bodies as collide() finds them, in this range. Steps of a simulation need no more than the band:
-/// what they move farther has speculative contacts. ContactOptions::exact searches beyond the band in any case.
+/// points that move into it have speculative contacts. ContactOptions::exact searches beyond the band in any case.
 ContactReport collideWithin(ContactRange range, const Placed& a, const Placed& b, const ContactOptions& options,
                             std::vector<Contact>& contacts, ContactCache* cache = nullptr);
 

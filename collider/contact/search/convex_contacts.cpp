@@ -90,7 +90,7 @@ void followEdges(const ConvexInField& body, std::uint32_t index, const NearestPo
             return slopeAlong(along, place, sampleAt(place));
         };
         const ValueAndSlope first = slopeAlong(along, 0, {here.distance, here.normal}), last = *slopeAt(length);
-        // If both ends are within reach, one of them is enough.
+        // if both ends are within reach, process the edge only once
         const bool isOther = last.value <= body.edgeReach && next < index;
         if (!fallsBetween(first, last) || isOther) continue;
         const auto lowest = deepestBetween(first, last, searchTolerance * body.voxel, slopeAt);

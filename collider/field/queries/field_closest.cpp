@@ -58,6 +58,7 @@ ClosestPoint closestWithoutMesh(const FieldData& field, const glm::vec3& point, 
 
 FieldData::FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outward)
     : FieldLayout(samples.shared()),
+      worldOrigin(samples.worldOrigin),
       kernels(samples.kernels),
       coarse(clearance()),
       mesh(std::make_unique<MeshTree>(std::move(outward), voxelSize)),

@@ -62,6 +62,7 @@ struct FieldData : FieldLayout {
     FieldData(const FieldData&) = delete;
     FieldData& operator=(const FieldData&) = delete;
 
+    glm::dvec3 worldOrigin{0};  ///< LevelSet::origin() [m]
     const SampleKernels& kernels;
     const Clearance coarse;
     std::unique_ptr<const MeshTree> mesh;  ///< null: the field has no mesh

@@ -19,7 +19,7 @@
 
 namespace bilayer::detail {
 
-/// Whether a key is within the reach of a query is decided to this.
+/// Tolerance of the test whether a key is within the reach of a query.
 inline constexpr double reachTolerance = 0.1 * zeroTolerance;
 
 /// The point with the smallest key so far. Keys count up to a tolerance beyond the reach: otherwise a search that finds
@@ -109,14 +109,14 @@ class SphereCastQuery : public BestZero {
         return along;
     }
 
-    // A convex shape is reached no sooner than a plane that separates it.
+    // The path to a plane that separates a convex shape is a lower bound of the path to the shape.
     double stepToPlane(const Separation& plane) const {
         const double left = plane.smallest - radius_, approach = glm::dot(plane.direction, path_.direction);
         if (!(left > 0)) return 0;
         return approach > 0 ? left / approach : infinity;
     }
 
-    // Points at a distance are reached no sooner than those of them that are farthest ahead.
+    // A lower bound of the path to any point of the cube: the path to the point farthest ahead.
     double stepToCube(double distance, const glm::dvec3& centre, const CubeExpansion& cube) const {
         if (!(distance > radius_)) return 0;
         const glm::dvec3 reach = cube.halfSide * glm::abs(path_.direction);

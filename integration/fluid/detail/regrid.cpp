@@ -21,6 +21,7 @@
 #include <bilayer/sdf/surface.h>
 #include "integration/fluid/detail/lattice_cover.h"
 #include "integration/fluid/detail/placement.h"
+#include "sdf/base/method_names.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/sign/hole_width.h"
@@ -36,8 +37,6 @@ using openvdb::FloatGrid;
 using openvdb::FloatTree;
 using openvdb::math::Transform;
 using Leaf = FloatTree::LeafNodeType;
-
-constexpr const char* byFlood = "flood";  // LevelSet::sign() of a mesh whose winding numbers are of no use
 
 constexpr float minFieldWidthVoxels = 1;  // [field voxels] on either side; a narrower band does not define the surface
 constexpr float widthTolerance = 1e-5f;   // tolerance of a width that is a whole number of voxels
@@ -205,7 +204,7 @@ FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transf
                                                .interiorWidthVoxels = widthInVoxels,
                                                .unite = uniteSolids,
                                                .progress = progress});
-    if (field.sign() == byFlood) refuseWithoutInside(field.signReason());
+    if (field.sign() == nameOf(Sign::flood)) refuseWithoutInside(field.signReason());
     requireWide(field, placed, voxels, choosing);
     const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);
     grid->setTransform(voxels.copy());

@@ -14,9 +14,7 @@ from bilayer.results import (
     Impact,
     MassProperties,
     MeshReport,
-    Samples,
-    Seeded,
-    Sparse,
+    Samples, Seeded, Sparse,
 )
 
 # A Pose, a matrix of shape (4, 4), or None.
